@@ -20,10 +20,11 @@ const RARE = {
   'probe-shaders': ['probe_depth'],
   'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
   'linear-shaders': ['compose_linear'],
+  'order-shaders': ['pixel_depths', 'pixel_depths_quantized', 'rasterize_tiles_order'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
 const QUANTIZED = {
-  stages: ['cull', 'cull_serial', 'project'],
+  stages: ['cull', 'cull_serial', 'pixel_depths', 'project'],
   replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
 };
 /** Those of another package, which takes shared parts from the renderer. */
@@ -124,9 +125,8 @@ const header = '/** Written by scripts/build-shaders.mjs from shaders/. Do not e
 const define = ([name, value]) => `export const ${name} = ${literal(value)} as const;`;
 /** As any string: declarations would hold all of the code once more. */
 const part = (path) => `export const ${partName(path)}: string = ${JSON.stringify(parts.get(path))};`;
-/** What several files of stages need is in `shaders.ts`. */
-const usersOf = (path) => stageFiles.filter((file) => partsIn[file].has(path));
-const isShared = (path) => partsIn.shaders.has(path) || usersOf(path).length > 1;
+/** The file that has a part, from which others import it: `shaders.ts` only where its own stages need it. */
+const homeOf = (path) => stageFiles.find((file) => partsIn[file].has(path));
 
 /** What stages of the given kind say, by name. */
 function saidBy(named, isMeant) {
@@ -136,12 +136,18 @@ function saidBy(named, isMeant) {
 const isOfRenderer = (homes) => [...homes].some((file) => file !== ECONOMISE);
 const byName = ([a], [b]) => (a < b ? -1 : 1);
 
-function rareFile(file, from = './shaders.js') {
+/** @param from where parts of all other files are; else each is imported from its own */
+function rareFile(file, from) {
   const paths = [...partsIn[file]];
-  const shared = paths.filter(isShared);
+  const moduleOf = (path) => from ?? `./${homeOf(path)}.js`;
+  const others = paths.filter((path) => homeOf(path) !== file);
+  const importOf = (module) => {
+    const names = others.filter((path) => moduleOf(path) === module).map(partName);
+    return `import { ${names.join(', ')} } from '${module}';`;
+  };
   return [
-    ...(shared.length > 0 ? [`import { ${shared.map(partName).join(', ')} } from '${from}';`] : []),
-    ...paths.filter((path) => !isShared(path)).map(part),
+    ...[...new Set(others.map(moduleOf))].map(importOf),
+    ...paths.filter((path) => homeOf(path) === file).map(part),
     ...sections[file],
   ];
 }
@@ -159,7 +165,7 @@ const files = {
   shaders: [
     "export * as layouts from './layouts.js';",
     "export * as constants from './constants.js';",
-    ...[...parts.keys()].filter(isShared).map(part),
+    ...[...partsIn.shaders].map(part),
     ...sections.shaders,
   ],
   ...Object.fromEntries(

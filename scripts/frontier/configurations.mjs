@@ -11,6 +11,8 @@ export const configurations = [
   { name: 'quads, float16', tier: 'variant', options: { rasterizer: 'quads', accumulation: 'rgba16float' } },
   { name: 'quads, float32', tier: 'variant', options: { rasterizer: 'quads', accumulation: 'rgba32float' } },
   { name: 'tiles', tier: 'variant', options: { rasterizer: 'tiles' } },
+  { name: 'order by pixel', tier: 'lever', options: { rasterizer: 'tiles', order: 'pixel' } },
+  { name: 'order by pixel, wide', tier: 'lever', options: { rasterizer: 'tiles', order: 'pixel', orderWindow: 32 } },
   { name: 'SH in float16', tier: 'lever', pack: { sh: 'float16' } },
   { name: 'SH in int8', tier: 'lever', pack: { sh: 'int8' } },
   { name: 'SH degree 1', tier: 'lever', options: { shDegree: 1 } },

@@ -1,6 +1,6 @@
 // Paints tiles of 16 x 16 pixels, one workgroup each and one thread a pixel, front to back in float32 registers, and stops
-// when nothing behind can be seen. Whoever imports this says what is noted on the way: `clear_notes`, `note_blend`,
-// `keep_notes` and `note_pixel`; and what else is in the picture: `load_depth`, `start_pixel` and `is_hidden`.
+// when nothing behind can be seen. Whoever imports this says how a pixel takes the splats of a batch: `packed_color`, `load_more`, `paint_batch` and
+// `paint_rest` (shared/paint_listed); what is noted on the way: `clear_notes`, `keep_notes` and `note_pixel`; and what else is in the picture: `start_pixel`.
 #import shared/bins
 #import shared/bits
 #import shared/coverage
@@ -51,19 +51,15 @@ struct Brush {
   v_0: f32,
   // log2 of the opacity
   power: f32,
-  // float16
-  red_green: u32,
-  // float32; where notes are taken blue and depth, as in ProjectedSplat
-  blue: u32,
+  // As `packed_color` says.
+  color: vec2u,
 }
 
 // The window on the bin's pairs: a bit for each that touches the tile, and how many of these there are up to the end of each word.
 var<workgroup> window: array<u32, TILE_THREADS>;
 var<workgroup> found_upto: array<u32, TILE_THREADS>;
 var<workgroup> found: u32;
-// Slots of the splats at hand, a batch, front to back;
-var<workgroup> slots: array<u32, TILE_THREADS>;
-// how they paint, and behind the last place of the batch one that reaches no pixel;
+// How the splats at hand paint, a batch, front to back, and behind the last place of the batch one that reaches no pixel;
 var<workgroup> brushes: array<Brush, TILE_THREADS + 1u>;
 // for each block of the tile a bit for each splat that touches it.
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
@@ -145,16 +141,14 @@ fn found_pair(nth: u32) -> u32 {
 
 fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
   let s = splats[slot];
-  slots[k] = slot;
-  load_depth(k, slot);
+  load_more(k, slot, s, tile_corner);
   hit_blocks(k, s, tile_corner);
   let center = s.shape.xy - tile_corner;
   let u_x = s.shape.z * BASE_2_AXIS;
   let v_y = bitcast<f32>(s.paint.x) * BASE_2_AXIS;
   let v_x = -s.shape.w * v_y;
   let power = log2(bitcast<f32>(s.paint.w));
-  let blue = select(bitcast<u32>(splat_color(s).b), s.paint.z, NOTES_SPLATS);
-  brushes[k] = Brush(u_x, -u_x * center.x, v_x, v_y, -v_x * center.x - v_y * center.y, power, s.paint.y, blue);
+  brushes[k] = Brush(u_x, -u_x * center.x, v_x, v_y, -v_x * center.x - v_y * center.y, power, packed_color(s, slot));
 }
 
 struct Pixel {
@@ -169,35 +163,6 @@ const FINISHED = 2.0;
 
 fn is_finished(pixel: Pixel) -> bool {
   return pixel.least >= FINISHED;
-}
-
-fn blue_of(brush: Brush) -> f32 {
-  if (NOTES_SPLATS) { return unpack2x16float(brush.blue).x; }
-  return bitcast<f32>(brush.blue);
-}
-
-// Blends splat k of the batch. Without a branch, which takes a third more time: where the splat does not reach, and where the pixel is finished, nothing
-// is added.
-fn blend(pixel: ptr<function, Pixel>, k: u32, brush: Brush, place: vec2f, least_power: f32) {
-  let u = brush.u_x * place.x + brush.u_0;
-  let v = brush.v_x * place.x + (brush.v_y * place.y + brush.v_0);
-  let power = brush.power - u * u - v * v;
-  let reaches = power >= least_power;
-  let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
-  // Those behind a hidden one are hidden, too.
-  (*pixel).least = select((*pixel).least, FINISHED, is_hidden(k));
-  let before = (*pixel).transmittance;
-  let full_weight = before * alpha;
-  let remaining = before - full_weight;
-  let ends = remaining <= (*pixel).least;
-  var refuses = ends;
-  if (!refuses_last) { refuses = remaining <= REFUSED || is_finished(*pixel); }
-  (*pixel).least = select((*pixel).least, FINISHED, ends);
-  let after = select(remaining, before, refuses);
-  let weight = select(full_weight, 0.0, refuses);
-  note_blend(k, weight, before, after, brush.blue);
-  (*pixel).color += weight * vec3f(unpack2x16float(brush.red_green), blue_of(brush));
-  (*pixel).transmittance = after;
 }
 
 // Storing may cut off what the image has no room for, which costs 5 dB. So what is stored is the nearest of the numbers that float16 can hold, in its
@@ -262,29 +227,16 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (count == 0u) { break; }
     workgroupBarrier();
 
-    for (var word = 0u; word < BATCH_WORDS; word++) {
-      if (is_finished(pixel)) { break; }
-      // Of these 32 splats those that touch the block, two at once: the second is read while the first is blended.
-      var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
-      while (ahead > 0u) {
-        let k = word * 32u + zeros_below(ahead);
-        ahead &= ahead - 1u;
-        let next = select(NO_SPLAT, word * 32u + zeros_below(ahead), ahead != 0u);
-        ahead &= ahead - 1u;
-        let brush = brushes[k];
-        let next_brush = brushes[next];
-        blend(&pixel, k, brush, place, least_power);
-        blend(&pixel, next, next_brush, place, least_power);
-      }
-    }
+    paint_batch(&pixel, own_block, place, least_power);
     if (!is_finished(pixel)) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
 
-    if (lane < count) { keep_notes(lane, slots[lane]); }
+    if (lane < count) { keep_notes(lane); }
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }
   if (is_outside) { return; }
+  paint_rest(&pixel);
   note_pixel(position);
   var result = vec4f(pixel.color, pixel.transmittance);
   if (is_final) { result = vec4f(pixel.color, 1.0 - pixel.transmittance) + pixel.transmittance * view.background; }

@@ -125,6 +125,18 @@ test('tags of trainers set antialiased', async () => {
   assert.equal(await read('comment not antialiased 1'), false);
 });
 
+test('a tag of trainers that order splats pixel by pixel', async () => {
+  const columns = inriaColumns(rawSplats(1, 0));
+  const read = async (line: string) =>
+    (await readScene(writePly([{ name: 'vertex', columns }], { headerLines: [line] }))).hints?.order;
+  for (const name of ['pixel', 'per_pixel', 'hierarchical', 'full_sort', 'kbuffer', 'per_pixel_kbuffer'])
+    assert.equal(await read(`comment sorting_method ${name}`), 'pixel', name);
+  assert.equal(await read('comment SortMode: per_pixel_full'), 'pixel');
+  for (const name of ['global', 'cameraDistance', 'z'])
+    assert.equal(await read(`comment sorting_method ${name}`), undefined);
+  assert.equal(await read('comment no sorting_method pixel'), undefined);
+});
+
 test('2D Gaussians without scale_2 are flat discs', async () => {
   const columns = inriaColumns(rawSplats(4, 0)).filter(({ name }) => name !== 'scale_2');
   const cloud = await readScene(writePly([{ name: 'vertex', columns }]));

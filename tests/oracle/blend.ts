@@ -18,6 +18,8 @@ export interface ScreenSplat {
   readonly opacity: number;
   /** Red, green, blue; 0 or more, may exceed 1. */
   readonly color: Vector3;
+  /** Depth in camera axes, 0 where that is behind the camera, at which the splat is densest along the ray of a pixel. */
+  readonly depthAt?: (column: number, row: number) => number;
 }
 
 /** What the oracle draws. Rows run from the top, pixels within a row from the left. */
@@ -67,6 +69,47 @@ export function blend(
   for (const splat of splats) blendSplat(image, finished, splat, rules, limit);
 }
 
+/** What one pixel takes. */
+interface Fragment {
+  readonly splat: ScreenSplat;
+  readonly alpha: number;
+  readonly depth: number;
+}
+
+/**
+ * Blends splats in an order of each pixel's own: by where along its ray each is densest, equal depths in the order that is given. A splat is hidden where
+ * that lies behind the limit.
+ */
+export function blendByPixel(
+  image: OracleImage,
+  splats: readonly ScreenSplat[],
+  rules: Rules,
+  limit?: ArrayLike<number>,
+): void {
+  const rows: ScreenSplat[][] = Array.from({ length: image.height }, () => []);
+  for (const splat of splats) {
+    for (let row = splat.footprint.top; row < splat.footprint.bottom; row++) rows[row].push(splat);
+  }
+  const finished = new Uint8Array(image.width * image.height);
+  for (const [row, inRow] of rows.entries()) {
+    const fragments: Fragment[][] = Array.from({ length: image.width }, () => []);
+    for (const splat of inRow) {
+      const hopeless = hopelessPower(splat, rules);
+      for (let column = splat.footprint.left; column < splat.footprint.right; column++) {
+        const alpha = alphaAt(splat, column, row, rules, hopeless);
+        if (alpha === 0) continue;
+        const depth = splat.depthAt!(column, row);
+        if (!limit || depth <= limit[row * image.width + column]) fragments[column].push({ splat, alpha, depth });
+      }
+    }
+    for (const [column, found] of fragments.entries()) {
+      const pixel = row * image.width + column;
+      found.sort((a, b) => a.depth - b.depth);
+      for (const { splat, alpha, depth } of found) blendFragment(image, finished, pixel, splat, alpha, depth, rules);
+    }
+  }
+}
+
 function blendSplat(
   image: OracleImage,
   finished: Uint8Array,
@@ -74,41 +117,64 @@ function blendSplat(
   rules: Rules,
   limit: ArrayLike<number> | undefined,
 ): void {
-  const { width, color, transmittance, contributors, maxWeight, medianDepth } = image;
-  const { index, ellipse, footprint, opacity } = splat;
-  const { xx, xy, yy } = ellipse.conic;
-  const [red, green, blue] = splat.color;
-  // exp is the dear part: below this power alpha is surely under minAlpha. The margin leaves the decision to the test.
-  const hopeless = Math.log(rules.minAlpha / opacity) - 1e-6;
-
+  const { width } = image;
+  const { footprint } = splat;
+  const hopeless = hopelessPower(splat, rules);
   for (let row = footprint.top; row < footprint.bottom; row++) {
     for (let column = footprint.left; column < footprint.right; column++) {
       const pixel = row * width + column;
       if (finished[pixel] || (limit && splat.depth > limit[pixel])) continue;
-
-      const dx = column + 0.5 - ellipse.x;
-      const dy = row + 0.5 - ellipse.y;
-      const power = -0.5 * (xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy);
-      if (power > 0 || power < hopeless) continue;
-      const alpha = Math.min(rules.maxAlpha, opacity * Math.exp(power));
-      if (alpha < rules.minAlpha) continue;
-
-      const before = transmittance[pixel];
-      const after = before * (1 - alpha);
-      if (after < rules.minTransmittance || (rules.stopsAtEquality && after === rules.minTransmittance)) {
-        finished[pixel] = 1;
-        continue;
-      }
-      const weight = before * alpha;
-      color[3 * pixel] += weight * red;
-      color[3 * pixel + 1] += weight * green;
-      color[3 * pixel + 2] += weight * blue;
-      transmittance[pixel] = after;
-      if (before > 0.5 && after <= 0.5) medianDepth[pixel] = splat.depth;
-      contributors[pixel]++;
-      if (weight > maxWeight[index]) maxWeight[index] = weight;
+      const alpha = alphaAt(splat, column, row, rules, hopeless);
+      if (alpha > 0) blendFragment(image, finished, pixel, splat, alpha, splat.depth, rules);
     }
   }
+}
+
+/** exp is the dear part: below this power alpha is surely under minAlpha. The margin leaves the decision to the test. */
+const hopelessPower = ({ opacity }: ScreenSplat, { minAlpha }: Rules): number => Math.log(minAlpha / opacity) - 1e-6;
+
+/** 0 where the splat does not reach the pixel. */
+function alphaAt(
+  { ellipse, opacity }: ScreenSplat,
+  column: number,
+  row: number,
+  rules: Rules,
+  hopeless: number,
+): number {
+  const { xx, xy, yy } = ellipse.conic;
+  const dx = column + 0.5 - ellipse.x;
+  const dy = row + 0.5 - ellipse.y;
+  const power = -0.5 * (xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy);
+  if (power > 0 || power < hopeless) return 0;
+  const alpha = Math.min(rules.maxAlpha, opacity * Math.exp(power));
+  return alpha < rules.minAlpha ? 0 : alpha;
+}
+
+function blendFragment(
+  image: OracleImage,
+  finished: Uint8Array,
+  pixel: number,
+  { index, color: [red, green, blue] }: ScreenSplat,
+  alpha: number,
+  depth: number,
+  rules: Rules,
+): void {
+  const { color, transmittance, contributors, maxWeight, medianDepth } = image;
+  if (finished[pixel]) return;
+  const before = transmittance[pixel];
+  const after = before * (1 - alpha);
+  if (after < rules.minTransmittance || (rules.stopsAtEquality && after === rules.minTransmittance)) {
+    finished[pixel] = 1;
+    return;
+  }
+  const weight = before * alpha;
+  color[3 * pixel] += weight * red;
+  color[3 * pixel + 1] += weight * green;
+  color[3 * pixel + 2] += weight * blue;
+  transmittance[pixel] = after;
+  if (before > 0.5 && after <= 0.5) medianDepth[pixel] = depth;
+  contributors[pixel]++;
+  if (weight > maxWeight[index]) maxWeight[index] = weight;
 }
 
 /** Adds what shines through: C += T·background. */

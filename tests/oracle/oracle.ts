@@ -16,7 +16,16 @@ import {
   type Matrix4,
   type Vector3,
 } from '@gaussian-splat/core';
-import { addBackground, blend, emptyImage, nearestFirst, type OracleImage, type ScreenSplat } from './blend.js';
+import {
+  addBackground,
+  blend,
+  blendByPixel,
+  emptyImage,
+  nearestFirst,
+  type OracleImage,
+  type ScreenSplat,
+} from './blend.js';
+import { densestDepth } from './densest.js';
 import { footprintOf } from './footprint.js';
 import { projectEllipse, toCamera, worldPosition } from './projection.js';
 import { RULES, type Mode, type Rules, type RuleSet } from './rules.js';
@@ -34,6 +43,8 @@ export interface OracleOptions {
   readonly depth?: ArrayLike<number>;
   /** [N] one key for each splat of the cloud, blended ascending; default float32 z in camera axes. */
   readonly depthKeys?: ArrayLike<number>;
+  /** `pixel`: each pixel blends by where along its ray each splat is densest, whatever the keys say. Default `center`. */
+  readonly order?: 'center' | 'pixel';
 }
 
 /**
@@ -48,10 +59,12 @@ export function renderOracle(cloud: GaussianCloud, camera: Camera, options: Orac
 
   const image = emptyImage(camera.width, camera.height, cloud.count);
   const splats = screenSplats(cloud, camera, rules, options);
-  blend(image, nearestFirst(splats), rules, options.depth);
+  blenderOf(options)(image, nearestFirst(splats), rules, options.depth);
   if (options.background) addBackground(image, options.background);
   return image;
 }
+
+const blenderOf = ({ order }: Pick<OracleOptions, 'order'>): typeof blend => (order === 'pixel' ? blendByPixel : blend);
 
 /** A cloud that stands somewhere in a world. */
 export interface PlacedCloud {
@@ -66,7 +79,7 @@ export interface PlacedCloud {
 export function renderOracleWorld(
   placed: readonly PlacedCloud[],
   camera: Camera,
-  options: Pick<OracleOptions, 'rules' | 'depth' | 'background'>,
+  options: Pick<OracleOptions, 'rules' | 'depth' | 'background' | 'order'>,
 ): OracleImage {
   const rules = typeof options.rules === 'string' ? RULES[options.rules] : options.rules;
   let first = 0;
@@ -75,13 +88,13 @@ export function renderOracleWorld(
     const isInside = (i: number): boolean =>
       crop === undefined || worldPosition(cloud, i).every((v, axis) => v >= crop.min[axis] && v <= crop.max[axis]);
     const faded = { ...cloud, opacities: cloud.opacities.map((own, i) => (isInside(i) ? own * opacity : 0)) };
-    const all = screenSplats(faded, { ...camera, worldToCamera }, rules, { rules, mode });
+    const all = screenSplats(faded, { ...camera, worldToCamera }, rules, { rules, mode, order: options.order });
     const start = first;
     first += cloud.count;
     return all.filter(({ index }) => faded.opacities[index] > 0).map((s) => ({ ...s, index: start + s.index }));
   });
   const image = emptyImage(camera.width, camera.height, first);
-  blend(image, nearestFirst(splats), rules, options.depth);
+  blenderOf(options)(image, nearestFirst(splats), rules, options.depth);
   if (options.background) addBackground(image, options.background);
   return image;
 }
@@ -121,6 +134,7 @@ function screenSplats(cloud: GaussianCloud, camera: Camera, rules: Rules, option
       footprint: footprintOf(ellipse, opacity, camera, rules),
       opacity,
       color,
+      ...(options.order === 'pixel' && { depthAt: densestDepth(cloud, index, camera, center, rules) }),
     });
   }
   return splats;

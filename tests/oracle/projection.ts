@@ -100,7 +100,7 @@ export function rotationTimesScale(cloud: GaussianCloud, i: number): number[][] 
   ];
 }
 
-function linearPart({ worldToCamera: m }: Camera): number[][] {
+export function linearPart({ worldToCamera: m }: Camera): number[][] {
   return [
     [m[0], m[1], m[2]],
     [m[4], m[5], m[6]],

@@ -4,7 +4,7 @@ import manifest from './manifest.mjs';
 const GROUPS = {
   Basics: ['alt', 'camera-controls', 'auto-rotate', 'up', 'poster', 'loading', 'reveal'],
   Camera: ['camera-orbit', 'camera-target', 'field-of-view', 'views', 'navigation', 'interpolation-decay'],
-  Quality: ['quality', 'max-pixel-ratio', 'max-sh-degree', 'filter', 'detail', 'frame-budget', 'renderer'],
+  Quality: ['quality', 'max-pixel-ratio', 'max-sh-degree', 'filter', 'detail', 'frame-budget', 'order', 'renderer'],
   Interaction: [
     'zoom',
     'touch-action',

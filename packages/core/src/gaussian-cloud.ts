@@ -23,6 +23,8 @@ export interface CloudHints {
   readonly up?: Vector3;
   /** The tool that wrote the file, in its own words. */
   readonly generator?: string;
+  /** `pixel`: the scene was trained with splats ordered pixel by pixel, as StopThePop does. */
+  readonly order?: 'pixel';
   /** The file has triangles, too, which a cloud cannot hold. */
   readonly meshes?: boolean;
 }

@@ -14,6 +14,7 @@ export const SHADER_FILES = [
     'probe-shaders.js',
     'depth-shaders.js',
     'linear-shaders.js',
+    'order-shaders.js',
   ].map((file) => folder('renderer') + file),
 ];
 

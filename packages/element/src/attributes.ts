@@ -42,6 +42,8 @@ export type QualityChoice = 'auto' | Quality;
 export type FilterChoice = 'auto' | SplatFilter;
 /** What draws: `auto` is WebGPU where the browser has it, else WebGL 2. */
 export type RendererChoice = 'auto' | 'webgpu' | 'webgl';
+/** What splats are ordered by. `auto`: what the file says, else their centres. */
+export type OrderChoice = 'auto' | 'center' | 'pixel';
 /** When the wheel zooms, and when it is the page's. */
 export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 
@@ -341,6 +343,13 @@ export const ATTRIBUTES = {
    * @example filter="antialiased"
    */
   filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
+  /**
+   * What splats are ordered by. `center`: the depth of their centers, as most scenes are trained. `pixel`: at each pixel the point of its ray where a splat is
+   * densest. This does not pop when the camera turns, fits scenes that StopThePop trained, and takes the GPU longer.
+   * @default `auto`: what the file says, else `center`
+   * @example order="pixel"
+   */
+  order: keyword<OrderChoice>(['auto', 'center', 'pixel']),
   /**
    * Levels of detail. `auto` builds them where the GPU is too slow for the scene, and draws them while moving only. `off` builds none. Pixels such as
    * `1px` allow this error in every frame. Streamed scenes (`detail.json`, `lod-meta.json`) have levels: `auto` is `1px` for them, and `off` loads a

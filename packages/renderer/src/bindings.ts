@@ -70,13 +70,15 @@ export class FrameBindings {
   /** Of the survivors in the file's order. */
   readonly plan: GPUBindGroup;
   readonly #sorts = new Map<number, ReturnType<SortStage['bind']>>();
+  readonly table: PageTable;
+  readonly scratch: Scratch;
   readonly #stages: Stages;
-  readonly #scratch: Scratch;
   readonly #memory: GpuMemory;
 
   constructor(device: GPUDevice, stages: Stages, { table, scratch }: FrameBuffers) {
     this.#stages = stages;
-    this.#scratch = scratch;
+    this.table = table;
+    this.scratch = scratch;
     const memory = (this.#memory = new GpuMemory(device));
     this.pages = bindPages(stages, table, scratch);
     const { groupOffsets, plan } = scratch;
@@ -105,7 +107,7 @@ export class FrameBindings {
   sort(keyBits: number): ReturnType<SortStage['bind']> {
     const known = this.#sorts.get(keyBits);
     if (known) return known;
-    const { plan, keys, order, digitCounts, digitTotals } = this.#scratch;
+    const { plan, keys, order, digitCounts, digitTotals } = this.scratch;
     const made = this.#stages.sort.bind({ plan, keys, values: order, digitCounts, digitTotals }, keyBits);
     this.#sorts.set(keyBits, made);
     return made;

@@ -3,6 +3,7 @@ import type { FrameBindings, Stages } from './bindings.js';
 import type { Wishes, WishLevers } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Levers } from './levers.js';
+import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { Scratch } from './scratch.js';
 
 /** What the stages before the rasterizer need, bound and allocated beforehand. */
@@ -18,6 +19,8 @@ export interface Frame {
   readonly hasDetail: boolean;
   /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
   readonly isBudgeted: boolean;
+  /** Orders splats pixel by pixel. */
+  readonly order: PixelOrder | undefined;
   /** Whether the rasterizer needs the depths of the splats: keys must be depths. */
   readonly keepsDepths: boolean;
   readonly timer?: FrameTimer | undefined;
@@ -43,6 +46,7 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wish
   for (const { reading, project, splatCount } of bindings.pages) {
     reading.project.record(pass, project, Math.min(scratch.capacity, splatCount));
   }
+  frame.order?.recordDepths(pass, bindings);
   noteWishes(pass, frame, wishes);
   pass.end();
   if (frame.keepsSurvivors) scratch.keepSurvivors(encoder);

@@ -32,6 +32,14 @@ export interface Levers {
    * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
    */
   readonly transmittanceMin: number;
+  /**
+   * What splats are ordered by: `center`, the depth of their centres, as most scenes are trained; or `pixel`, at each pixel where along its ray a splat is
+   * densest. That does not pop when the camera turns, is what scenes of StopThePop and its successors are trained with, and takes the rasterizer `tiles`.
+   * Its code is loaded with the first frame that asks for it: until then splats are ordered by `center`.
+   */
+  readonly order: 'center' | 'pixel';
+  /** With `order: 'pixel'`: splats of a pixel that are sorted at once. One that is listed later than that is blended late. */
+  readonly orderWindow: 16 | 32;
   /** Spherical harmonics above this degree are ignored. */
   readonly shDegree: 0 | 1 | 2 | 3;
   /**
@@ -60,6 +68,8 @@ const EXACT: Levers = {
   depthKeyBits: 24,
   submissions: 1,
   transmittanceMin: TRAINED_TRANSMITTANCE,
+  order: 'center',
+  orderWindow: 16,
   shDegree: 3,
   detail: 0,
   detailFade: 0.5,
@@ -96,7 +106,10 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
 /**
  * The settings that frames may set otherwise than those before and behind them at no cost. The others decide what a viewpoint allocates.
  */
-export type FrameLevers = Pick<Levers, 'depthKeyBits' | 'transmittanceMin' | 'shDegree' | 'detail' | 'resolutionScale'>;
+export type FrameLevers = Pick<
+  Levers,
+  'depthKeyBits' | 'transmittanceMin' | 'order' | 'orderWindow' | 'shDegree' | 'detail' | 'resolutionScale'
+>;
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
   submissions: [1, 256],
@@ -113,6 +126,8 @@ const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
   threads: ['auto', 'parallel', 'serial'],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
   depthKeyBits: [16, 24, 32],
+  order: ['center', 'pixel'],
+  orderWindow: [16, 32],
   shDegree: [0, 1, 2, 3],
 };
 
@@ -127,6 +142,9 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
   const names = Object.keys(base) as (keyof Levers)[];
   const levers = Object.fromEntries(names.map((name) => [name, options[name] ?? base[name]])) as unknown as Levers;
   for (const name of names) requireInRange(name, levers[name]);
+  if (levers.order === 'pixel' && levers.rasterizer === 'quads') {
+    throw invalid('order', "'center' with the rasterizer quads: 'pixel' takes tiles", 'pixel');
+  }
   return levers;
 }
 

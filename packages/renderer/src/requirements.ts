@@ -2,6 +2,7 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { FrameSettings, Picture } from './picture.js';
 import { TEXTURE_USAGE } from './gpu/kernel.js';
+import type { Levers } from './levers.js';
 import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
 
 export function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
@@ -41,7 +42,8 @@ export function requireTarget(target: GPUTexture | undefined, format: string, { 
     );
 }
 
-export function requireNotes({ name, takesNotes }: Rasterizer): void {
+export function requireNotes({ name, takesNotes }: Rasterizer, { order }: Pick<Levers, 'order'>): void {
+  if (order === 'pixel') throw missing('notes', "settings with order: 'center', or no notes", "order: 'pixel'");
   if (takesNotes) return;
   throw new GaussianSplatError('unsupported/limits', {
     where: 'Picture.notes',

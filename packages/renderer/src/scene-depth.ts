@@ -8,6 +8,7 @@ import {
   ShaderProgram,
   TEXTURE_USAGE,
   type ComputeKernel,
+  type Overrides,
 } from './gpu/kernel.js';
 import { writeStruct } from './gpu/struct.js';
 import type { FrameNotes, PaintingDepth, QuadsWithDepth, RasterizerName } from './rasterizers/rasterizer.js';
@@ -92,17 +93,23 @@ export class SceneDepth implements PaintingDepth {
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#bytes);
   }
 
+  get overrides(): Overrides {
+    return { tests_depth: +(this.#host !== undefined), tells_depth: +(this.#outTexture !== undefined) };
+  }
+
+  get resources(): PaintingDepth['resources'] {
+    return { scene: this.#uniform, stored_depth: this.#stored, median_depth: this.#out };
+  }
+
   tilesKernel(variant: RasterizeVariant): RasterizeKernel {
-    const overrides = { tests_depth: +(this.#host !== undefined), tells_depth: +(this.#outTexture !== undefined) };
-    return rasterizeKernel(this.#device, variant, rasterizeTilesDepth, overrides) as unknown as RasterizeKernel;
+    return rasterizeKernel(this.#device, variant, rasterizeTilesDepth, this.overrides) as unknown as RasterizeKernel;
   }
 
   bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup {
     const key = [kernel, depths, ...Object.values(painted)];
     if (!isSame(this.#tiles?.key, key)) {
-      const own = { scene: this.#uniform, depths, stored_depth: this.#stored, median_depth: this.#out };
       const deep = kernel as unknown as ComputeKernel<typeof rasterizeTilesDepth>;
-      this.#tiles = { key, group: deep.bind({ ...painted, ...own }) };
+      this.#tiles = { key, group: deep.bind({ ...painted, depths, ...this.resources }) };
     }
     return this.#tiles!.group;
   }

@@ -41,8 +41,7 @@ export class Scratch {
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
-  #survivors: GPUBuffer | undefined;
-  #depths: GPUBuffer | undefined;
+  readonly #kept = new Map<string, GPUBuffer>();
 
   /** @param spareBytes least size of {@link spare} */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
@@ -115,7 +114,7 @@ export class Scratch {
 
   /** Numbers of the visible splats by slot, once {@link keepSurvivors} has been recorded: the sort overwrites what lists them. */
   get survivors(): GPUBuffer {
-    return (this.#survivors ??= this.#makeKept('survivors'));
+    return this.kept('survivors');
   }
 
   /** To be recorded between `compact` and the sort. */
@@ -125,7 +124,7 @@ export class Scratch {
 
   /** Camera depths by slot, float32, once {@link keepDepths} has been recorded. */
   get depths(): GPUBuffer {
-    return (this.#depths ??= this.#makeKept('depths'));
+    return this.kept('depths');
   }
 
   /** To be recorded between `project` and the sort, which moves the keys, of a frame whose keys are depths. */
@@ -133,9 +132,15 @@ export class Scratch {
     encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
   }
 
-  #makeKept(name: string): GPUBuffer {
-    const { storage, copyDestination } = BUFFER_USAGE;
-    return this.#memory.buffer(`gs.${name}`, 4 * this.capacity, storage | copyDestination);
+  /** A buffer of so many bytes for each visible splat, made when it is first asked for. */
+  kept(name: string, bytes = 4): GPUBuffer {
+    let buffer = this.#kept.get(name);
+    if (buffer === undefined) {
+      const { storage, copyDestination } = BUFFER_USAGE;
+      buffer = this.#memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copyDestination);
+      this.#kept.set(name, buffer);
+    }
+    return buffer;
   }
 
   get byteLength(): number {

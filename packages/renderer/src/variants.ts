@@ -31,7 +31,8 @@ export const variantsOf = (device: GPUDevice): Variants => known(device).variant
 
 /** Levers with every `auto` replaced by what suits the device. */
 export function settle(variants: Variants, levers: Levers): Levers & Variants {
-  const rasterizer = levers.rasterizer === 'auto' ? variants.rasterizer : levers.rasterizer;
+  const own = levers.order === 'pixel' ? 'tiles' : variants.rasterizer;
+  const rasterizer = levers.rasterizer === 'auto' ? own : levers.rasterizer;
   const suits = rasterizer === variants.rasterizer ? variants.accumulation : SAFE.accumulation;
   return {
     ...levers,

@@ -9,9 +9,11 @@ import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
+import { orderOn } from './lazy-order.js';
 import { leversOf, type Levers } from './levers.js';
 import type { FrameSettings, Picture, Target } from './picture.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
+import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { NotedFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
 import { requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
@@ -106,6 +108,8 @@ export class Viewpoint {
   /** By size, the one used last at the end. */
   readonly #accumulations = new Map<string, Accumulation>();
   #mostSizes = 1;
+  /** Whether the last frame had to do without the code for its order. */
+  #lacksOrder = false;
   /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
   #last: { readonly scratch: Scratch; readonly scale: number } | undefined;
 
@@ -168,7 +172,10 @@ export class Viewpoint {
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
     const { rasterizer } = this.#engine;
     const all = settings.map((each) => this.#leversOf(each));
-    for (const levers of all) rasterizer.prepare(levers, targetFormat);
+    for (const levers of all) {
+      const order = levers.order === 'pixel' ? orderOn(this.#device).now : undefined;
+      rasterizer.prepare(levers, targetFormat, order?.paintingOf(levers));
+    }
     const isSmaller = all.some(({ resolutionScale }) => resolutionScale < 1);
     if (isSmaller) this.#compose.prepare(targetFormat, rasterizer.finishes(targetFormat));
   }
@@ -233,10 +240,12 @@ export class Viewpoint {
     requireTextureSize(this.#device, camera);
     const target = this.#targetOf(picture, camera);
     const asked = this.#leversOf(settings);
+    const order = this.#orderOf(asked);
+    this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
-    const levers = depth ? { ...asked, depthKeyBits: 32 as const } : asked;
+    const levers = depth && !order ? { ...asked, depthKeyBits: 32 as const } : asked;
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
-    if (notes) requireNotes(rasterizer);
+    if (notes) requireNotes(rasterizer, levers);
     const drawn = scaled(camera, levers.resolutionScale);
     depth?.prepare(camera, drawn, rasterizer.name, notes);
     const resources = all.fit(this.world, levers.splatBudget);
@@ -254,7 +263,8 @@ export class Viewpoint {
       keepsSurvivors: notes !== undefined,
       hasDetail: table.hasDetail,
       isBudgeted: levers.splatBudget > 0 && table.hasDetail,
-      keepsDepths: depth !== undefined,
+      order,
+      keepsDepths: depth !== undefined && !order,
       timer,
     });
     const isWatched = monitor.isDue(rasterizer.pairPlan !== undefined, {
@@ -263,7 +273,9 @@ export class Viewpoint {
       isWhole: isWhole(levers, this.levers),
     });
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
-    const how = { levers, notes, survivors: notes && scratch.survivors, timer, depth, depths: depth && scratch.depths };
+    const depths = depth && !order ? scratch.depths : undefined;
+    const ordered = order?.paintingOf(levers, camera, scratch);
+    const how = { levers, notes, survivors: notes && scratch.survivors, timer, depth, depths, ordered };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);
     this.#last = { scratch, scale: drawn.width / camera.width };
     return { last, isWatched, submissions, wishes, resources };
@@ -293,12 +305,25 @@ export class Viewpoint {
     return readStatistics(this.#device, { plan, gathered, chunkShares, pairPlan: this.#engine.rasterizer.pairPlan });
   }
 
+  /** What orders the splats of a frame pixel by pixel; undefined where nothing does, or not yet: then {@link ViewpointOptions.onIncomplete} says when. */
+  #orderOf({ order }: Levers): PixelOrder | undefined {
+    if (order === 'center') return undefined;
+    const lazy = orderOn(this.#device);
+    // Whoever asks whether the frame is complete is told of an error.
+    if (!lazy.now) lazy.load().then(this.#onIncomplete, () => undefined);
+    return lazy.now;
+  }
+
   /**
-   * Whether the last frame had room for all that it should show; if not, the next one will. Reads back from the GPU: for single
+   * Whether the last frame had room, and the code, for all that it should show; if not, the next one will. Reads back from the GPU: for single
    * images, not for every frame.
    */
   async isComplete(): Promise<boolean> {
     if (this.#engine.resources.current === undefined) return true;
+    if (this.#lacksOrder) {
+      await orderOn(this.#device).load();
+      return false;
+    }
     const { visible, overflow, pairs, pairOverflow } = await this.statistics();
     return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow));
   }
@@ -344,7 +369,7 @@ export class Viewpoint {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'levers' | 'notes' | 'survivors' | 'timer' | 'depth' | 'depths'>,
+    how: Pick<Painting, 'levers' | 'notes' | 'survivors' | 'timer' | 'depth' | 'depths' | 'ordered'>,
     { over, colours }: Picture,
     submissions: Submissions,
   ): GPUCommandEncoder {

@@ -8,17 +8,19 @@ interface Splat {
   readonly at: readonly [number, number, number];
   readonly colour: readonly [number, number, number];
   readonly scale?: number;
+  /** A thin disc, turned about the vertical axis by so many radians. */
+  readonly turn?: number;
 }
 
-/** Address of a PLY of round splats. */
+/** Address of a PLY of balls and discs. */
 function ply(splats: readonly Splat[], comments: readonly string[] = [], name = 'a.ply'): string {
   const properties = ['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2', 'opacity', 'scale_0', 'scale_1', 'scale_2'];
   const all = [...properties, 'rot_0', 'rot_1', 'rot_2', 'rot_3'];
-  const rows = splats.map(({ at, colour, scale = 0.2 }) =>
-    [...at, ...colour.map((c) => (c - 0.5) / 0.28209479), 4, ...[0, 0, 0].map(() => Math.log(scale)), 1, 0, 0, 0].join(
-      ' ',
-    ),
-  );
+  const rows = splats.map(({ at, colour, scale = 0.2, turn }) => {
+    const scales = [scale, scale, turn === undefined ? scale : scale / 100].map(Math.log);
+    const rotation = [Math.cos((turn ?? 0) / 2), 0, Math.sin((turn ?? 0) / 2), 0];
+    return [...at, ...colour.map((c) => (c - 0.5) / 0.28209479), 4, ...scales, ...rotation].join(' ');
+  });
   const head = ['ply', 'format ascii 1.0', ...comments.map((comment) => `comment ${comment}`)];
   const header = [
     ...head,
@@ -65,6 +67,32 @@ describe('up, as the file says it', () => {
     const screen = await screenOf(element);
     assert(screen.middleOf(isGreen)!.y > screen.middleOf(isRed)!.y + 20, 'green is below');
   });
+});
+
+describe('the order of splats', () => {
+  /** Two discs that cut one another along an upright line: each is in front on one side of it. */
+  const crossing: readonly Splat[] = [
+    { at: [0, 0, 0], colour: RED, scale: 0.5, turn: 1 },
+    { at: [0, 0, 0], colour: GREEN, scale: 0.5, turn: -1 },
+  ];
+  const cases: readonly [comments: readonly string[], order: string | undefined, isByPixel: boolean][] = [
+    [[], undefined, false],
+    [['sorting_method pixel'], undefined, true],
+    [['sorting_method pixel'], 'center', false],
+    [[], 'pixel', true],
+  ];
+  for (const [comments, order, isByPixel] of cases)
+    it(`${comments.join() || 'no comment'}, order ${order ?? 'not set'}: ${isByPixel ? 'by pixel' : 'by center'}`, async () => {
+      const src = ply(crossing, comments);
+      const element = await showLoaded({ src, ...(order && { order }) }, 'width: 120px; height: 120px');
+      const isThere = async (): Promise<boolean> => {
+        const screen = await screenOf(element);
+        return Boolean(screen.middleOf(isRed) && screen.middleOf(isGreen)) === isByPixel;
+      };
+      // The code for it is fetched when the first frame asks.
+      for (let tries = 0; isByPixel && tries < 200 && !(await isThere()); tries++) await frames(3);
+      assert(await isThere(), isByPixel ? 'each disc is in front on its side' : 'one disc is in front of the other');
+    });
 });
 
 describe('the filter', () => {

@@ -2,6 +2,7 @@ import type { Camera } from '@gaussian-splat/core';
 import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
 import type { CanvasFrame, Contents, Painter, Place, Surface } from '../gpu/painter.js';
 import { why } from '../gpu/request-device.js';
@@ -12,7 +13,12 @@ import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
 export interface ViewHost extends Contents {
-  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'filter' | 'maxPixelRatio' | 'frameBudget'>;
+  readonly attributes: Pick<
+    Attributes,
+    'quality' | 'maxShDegree' | 'order' | 'filter' | 'maxPixelRatio' | 'frameBudget'
+  >;
+  /** The sources that are drawn. */
+  readonly shown: readonly LoadedGaussians[];
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
@@ -219,9 +225,11 @@ export class ViewController implements FrameClient {
   }
 
   #applyRendering(painter: Painter): void {
-    const { quality, maxShDegree: shDegree, filter } = this.#host.attributes;
+    const { quality, maxShDegree: shDegree, filter, order: choice } = this.#host.attributes;
+    const trainedOrder = this.#host.shown.some(({ order }) => order) ? 'pixel' : 'center';
+    const order = choice === 'auto' ? trainedOrder : choice;
     const trained = filter === 'auto' ? undefined : filter;
-    painter.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, filter: trained });
+    painter.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, order, filter: trained });
   }
 
   #finishUnseen(): void {

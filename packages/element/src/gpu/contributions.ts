@@ -34,7 +34,7 @@ async function countContributing({ device, view }: Viewport, camera: Camera): Pr
         .flatMap(({ scene, visible }) => (visible ? scene.pages : []))
         .reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
     );
-  const viewpoint = new Viewpoint(device, world, { settings: { ...settings, rasterizer: 'tiles' } });
+  const viewpoint = new Viewpoint(device, world, { settings: { ...settings, rasterizer: 'tiles', order: 'center' } });
   const contributions = device.createBuffer({ label: 'gs.contributions', size, usage: STORAGE | COPY_SRC });
   const staging = device.createBuffer({ label: 'gs.contributions.read', size, usage: MAP_READ | COPY_DST });
   const target = device.createTexture({

@@ -47,6 +47,8 @@ export class LoadedGaussians {
   readonly submissions: number;
   /** Its triangles, once they are read. */
   model: MeshModel | undefined;
+  /** What its splats are ordered by, where its file tells. */
+  readonly order: 'pixel' | undefined;
   /** Its file has triangles, too. */
   readonly hasMeshes: boolean;
   /** What of its file is not drawn, for people. */
@@ -67,11 +69,13 @@ export class LoadedGaussians {
     {
       live,
       detail = {},
+      order,
       hasMeshes = false,
       warnings = [],
     }: {
       live?: Timeline | undefined;
       detail?: DetailLevers;
+      order?: 'pixel' | undefined;
       hasMeshes?: boolean | undefined;
       warnings?: readonly string[] | undefined;
     } = {},
@@ -82,6 +86,7 @@ export class LoadedGaussians {
     this.submissions = submissions;
     this.live = live;
     this.#detail = detail;
+    this.order = order;
     this.hasMeshes = hasMeshes;
     this.warnings = warnings;
     if (live) QueueClock.of(lease.device).isShared = true;

@@ -1,6 +1,7 @@
 import type { Camera, GaussianSplatError, ShDegree, SplatFilter } from '@gaussian-splat/core';
 import type {
   FrameLevers,
+  Levers,
   Picture,
   ProbeAnswer,
   ProbePoint,
@@ -18,6 +19,7 @@ export interface Rendering {
   readonly quality: Quality;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly shDegree: ShDegree;
+  readonly order: Levers['order'];
   /** In place of those of the scenes. */
   readonly filter?: SplatFilter | undefined;
 }

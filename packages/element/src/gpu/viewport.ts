@@ -21,7 +21,7 @@ export class Viewport implements Painter {
   readonly #contents: Contents;
   readonly #events: PainterEvents;
   readonly #clock: QueueClock;
-  #rendering: Rendering = { quality: 'default', shDegree: 3 };
+  #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
   #filter: FrameFilter | undefined;
   #isDestroyed = false;
   #isPrepared = false;
@@ -61,10 +61,10 @@ export class Viewport implements Painter {
   }
 
   setRendering(rendering: Rendering): void {
-    const { quality, shDegree } = this.#rendering;
+    const { quality, shDegree, order } = this.#rendering;
     // A filter takes effect with the next frame, whatever draws it.
     this.#rendering = rendering;
-    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
+    if (rendering.quality === quality && rendering.shDegree === shDegree && rendering.order === order) return;
     this.#isPrepared = false;
     this.viewpoint.settings = this.#settings();
     this.#drawnSize = '';
@@ -85,10 +85,10 @@ export class Viewport implements Painter {
   #settings(levers?: Partial<FrameLevers>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { submissions } = this.#place;
-    const { quality, shDegree } = this.#rendering;
+    const { quality, shDegree, order } = this.#rendering;
     // Whichever leaves out more: what the page asks for, or the pace.
     const most = Math.max(detail, levers?.detail ?? 0);
-    return { quality, shDegree, submissions, ...levers, detail: most, splatBudget };
+    return { quality, shDegree, order, submissions, ...levers, detail: most, splatBudget };
   }
 
   get isPrepared(): boolean {

@@ -114,7 +114,7 @@ export class LargePly {
       const shares = this.#answers.map((answer) => answer?.packed);
       const first = this.#answers.find((answer) => answer?.packed);
       if (!first || shares.includes(undefined)) return undefined;
-      const { shDegree = 0, antialiased = false, filterVariance, origin = [0, 0, 0], up, warnings } = first;
+      const { shDegree = 0, antialiased = false, filterVariance, origin = [0, 0, 0], up, order, warnings } = first;
       const packed = shares as PackedShare[];
       const droppedCount = this.#count - packed.reduce((sum, { count }) => sum + count, 0);
       // Who reads it whole says why.
@@ -125,7 +125,7 @@ export class LargePly {
       if (typeof joined !== 'string') {
         const { positions, opacities } = joined;
         const bounds = boundsOf({ count: opacities.length, positions, opacities, origin });
-        return { packed: joined.packed, bounds: { ...bounds, up }, warnings };
+        return { packed: joined.packed, bounds: { ...bounds, up }, order, warnings };
       }
       // Its colours need another precision than was taken for granted.
       this.#precision = joined;

@@ -61,6 +61,7 @@ export async function loadScene(
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
       warnings: cloud.warnings,
+      order: cloud.hints?.order,
       hasMeshes: cloud.hints?.meshes,
     });
     const start = performance.now();

@@ -23,6 +23,7 @@ export interface ShareAnswer {
   readonly preview?: GaussianCloud;
   readonly shDegree?: ShDegree;
   readonly antialiased?: boolean;
+  readonly order?: 'pixel' | undefined;
   readonly filterVariance?: number | undefined;
   /** What the file says points up. */
   readonly up?: Vector3 | undefined;
@@ -37,7 +38,7 @@ export async function packRows({ share, bytes, shPrecision, name }: ShareRequest
   if (cloud === undefined) return { share };
   const { shDegree, antialiased, filterVariance, origin, hints, warnings } = cloud;
   return {
-    ...{ share, shDegree, antialiased, filterVariance, origin, up: hints?.up, warnings },
+    ...{ share, shDegree, antialiased, filterVariance, origin, up: hints?.up, order: hints?.order, warnings },
     packed: packShare(cloud, shPrecision),
     preview: samplePreview(cloud),
   };

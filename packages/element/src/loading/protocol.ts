@@ -60,6 +60,8 @@ export interface LoadedScene {
   readonly bounds: SceneBounds;
   /** What of the file is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
+  /** What splats are ordered by, where the file tells: see `CloudHints.order`. */
+  readonly order?: 'pixel' | undefined;
   /** The file has triangles, too. */
   readonly hasMeshes?: boolean | undefined;
 }

@@ -9,6 +9,11 @@ import { OFFSETS, PLAIN } from './load-meaning.js';
 /** Variance in px² with which Mip-Splatting and Brush's mip mode train. */
 export const MIP_VARIANCE = 0.1;
 
+/** The key of the comment that says how a scene was sorted in training. */
+const SORTING = /^sort(?:ing)?_?(?:method|mode)\s*[:=]?\s*(\S+)$/i;
+/** No trainer writes it yet: `pixel`, and the names that StopThePop's settings have for its ways to sort pixel by pixel. */
+const ORDERS_PIXELS = /^(per_?)?pixel|^(hierarchical|full_sort|k_?buffer)$/;
+
 /** Text of the comments that follow a key such as `Vertical Axis:`; the last one wins, as in the tools that write them. */
 function valueOf(comments: readonly string[], key: RegExp): string | undefined {
   return comments
@@ -18,7 +23,7 @@ function valueOf(comments: readonly string[], key: RegExp): string | undefined {
     .toLowerCase();
 }
 
-/** Sets what the comments of a header tell: filter, up, and the tool that wrote the file. */
+/** Sets what the comments of a header tell: filter, order, up, and the tool that wrote the file. */
 export function readComments(cloud: DraftCloud, comments: readonly string[]): void {
   const mode = valueOf(comments, /^splatrendermode\s*:\s*(.*)$/i);
   if (mode !== undefined) cloud.antialiased = mode === 'mip';
@@ -28,6 +33,7 @@ export function readComments(cloud: DraftCloud, comments: readonly string[]): vo
   // gsplat's trainer compensates for 0.3.
   else if (mode === 'mip' && !comments.some((text) => /gsplat/i.test(text))) cloud.filterVariance = MIP_VARIANCE;
   const generator = valueOf(comments, /^((?:generated|exported|created) .*)$/i);
+  if (ORDERS_PIXELS.test(valueOf(comments, SORTING) ?? '')) cloud.hints = { ...cloud.hints, order: 'pixel' };
   const up = upOf(comments);
   if (up) cloud.hints = { ...cloud.hints, up };
   if (generator !== undefined) cloud.hints = { ...cloud.hints, generator };

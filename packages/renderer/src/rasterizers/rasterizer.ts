@@ -1,6 +1,6 @@
 import type { FrameTimer } from '../gpu/pass-timer.js';
 import type { Camera } from '@gaussian-splat/core';
-import type { ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
+import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { Levers } from '../levers.js';
 import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
@@ -81,6 +81,20 @@ export interface PaintingDepth {
   tilesKernel(variant: RasterizeVariant): RasterizeKernel;
   bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
   readonly quadsProgram: QuadsWithDepth;
+  /** What a shader that has depth among other things binds, and its overrides. */
+  readonly resources: Readonly<Record<'scene', GPUBuffer> & Record<'stored_depth' | 'median_depth', GPUTextureView>>;
+  readonly overrides: Overrides;
+}
+
+/** How tiles are painted that order splats pixel by pixel. */
+export interface OrderedPainting {
+  /** @param depth what the frame has to do with other depths */
+  tilesKernel(variant: RasterizeVariant, depth?: PaintingDepth): RasterizeKernel;
+  bindTiles(
+    kernel: RasterizeKernel,
+    painted: Parameters<RasterizeKernel['bind']>[0],
+    depth?: PaintingDepth,
+  ): GPUBindGroup;
 }
 
 /** Quads that read depths: what a pipeline is made of, and what is bound to it. */
@@ -112,6 +126,8 @@ export interface Painting {
   readonly depth?: PaintingDepth | undefined;
   /** Camera depths of the splats by slot; with {@link depth}. */
   readonly depths?: GPUBuffer | undefined;
+  /** `tiles` only. */
+  readonly ordered?: OrderedPainting | undefined;
 }
 
 /** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */
@@ -141,7 +157,7 @@ export interface Rasterizer {
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Makes the pipelines for other levers, so that no frame has to. @param format of the targets */
-  prepare(levers: PaintingLevers, format: GPUTextureFormat): void;
+  prepare(levers: PaintingLevers, format: GPUTextureFormat, ordered?: OrderedPainting): void;
   /** Records what the parts of one frame have in common, before the first of them. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
   /** Records the drawing of one part of one frame. Parts of a frame are submitted one by one. */

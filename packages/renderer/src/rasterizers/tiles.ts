@@ -9,6 +9,7 @@ import type {
   AccumulationFormat,
   FrameNotes,
   NotedFrame,
+  OrderedPainting,
   Painting,
   PaintingLevers,
   Rasterizer,
@@ -18,7 +19,13 @@ import type {
   Surface,
 } from './rasterizer.js';
 import { pairBuffers, spareBytesOf, type PairBuffers } from './pair-buffers.js';
-import { listingKernels, rasterizeKernel, type ListingKernels, type RasterizeKernel } from './tile-kernels.js';
+import {
+  listingKernels,
+  rasterizeKernel,
+  type ListingKernels,
+  type RasterizeKernel,
+  type RasterizeVariant,
+} from './tile-kernels.js';
 import { sliceOfTiles } from './tile-slice.js';
 
 const { BIN_WIDTH, BIN_HEIGHT, PREFIX_THREADS, PROJECT_GROUP, TILE } = constants;
@@ -120,10 +127,12 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = pairBuffers(this.#memory, inputs);
   }
 
-  prepare(levers: PaintingLevers, format: GPUTextureFormat): void {
+  prepare(levers: PaintingLevers, format: GPUTextureFormat, ordered?: OrderedPainting): void {
     const variant = { isNoting: false, refusesLast: refusesLast(levers) };
-    if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true }).prepare();
-    rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false }).prepare();
+    const prepare = (own: RasterizeVariant): unknown =>
+      (ordered?.tilesKernel(own) ?? rasterizeKernel(this.#device, own)).prepare();
+    if (this.finishes(format)) prepare({ ...variant, format, isFinal: true });
+    prepare({ ...variant, format: this.#accumulation, isFinal: false });
   }
 
   /** Lists the splats for the bins. */
@@ -146,7 +155,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, notes, survivors, timer, depth, depths } = painting;
+    const { surface, levers, background, notes, survivors, timer, depth, depths, ordered } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
     const { format, width, height } = surface;
@@ -162,13 +171,16 @@ export class TilesRasterizer implements Rasterizer {
       ...{ format, isFinal: background !== undefined, isNoting: notes !== undefined },
       refusesLast: refusesLast(levers),
     };
-    const kernel = depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant);
+    const kernel =
+      ordered?.tilesKernel(variant, depth) ??
+      (depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant));
     const image =
-      depth && depths
+      ordered?.bindTiles(kernel, this.#painted(bound, surface.view), depth) ??
+      (depth && depths
         ? depth.bindTiles(kernel, this.#painted(bound, surface.view), depths)
         : notes && survivors
           ? this.#bindNoting(kernel, bound, surface.view, { ...notes, survivors })
-          : this.#imageBindings(kernel, bound, surface.view);
+          : this.#imageBindings(kernel, bound, surface.view));
     kernel.dispatchGrid(paint, image, columns, rows);
     paint.end();
   }

@@ -1,0 +1,23 @@
+import { loadModule } from '@gaussian-splat/core';
+import { perDevice } from './gpu/kernel.js';
+import type { PixelOrder } from './rasterizers/pixel-order.js';
+
+/** What `order: 'pixel'` needs of a device: fetched when a frame first asks for it. */
+export interface LazyOrder {
+  /** Undefined until it is there. */
+  now?: PixelOrder;
+  /** @throws GaussianSplatError `network/unreachable` */
+  load(): Promise<unknown>;
+}
+
+export const orderOn = (device: GPUDevice): LazyOrder =>
+  perDevice(device, 'order', () => {
+    const lazy: LazyOrder = {
+      load: () =>
+        loadModule('the code that orders splats pixel by pixel', async () => {
+          const { PixelOrder } = await import('./rasterizers/pixel-order.js');
+          lazy.now ??= new PixelOrder(device);
+        }),
+    };
+    return lazy;
+  });

@@ -1,0 +1,99 @@
+/** An order of each pixel's own, for the rasterizer `tiles`: loaded with the first frame that asks for it. */
+import type { Camera } from '@gaussian-splat/core';
+import type { FrameBindings } from '../bindings.js';
+import { pixelDepths, pixelDepthsQuantized, rasterizeTilesOrder } from '../generated/order-shaders.js';
+import { constants, layouts } from '../generated/shaders.js';
+import {
+  BUFFER_USAGE,
+  kernelOf,
+  perDevice,
+  TEXTURE_USAGE,
+  type ComputeKernel,
+  type ShaderDescription,
+} from '../gpu/kernel.js';
+import type { Levers } from '../levers.js';
+import type { Scratch } from '../scratch.js';
+import type { OrderedPainting, PaintingDepth } from './rasterizer.js';
+import { rasterizeKernel, type RasterizeKernel } from './tile-kernels.js';
+
+type Painted = Parameters<RasterizeKernel['bind']>[0];
+type DepthResources = PaintingDepth['resources'];
+
+/** See shaders/pixel_depths.wgsl and shaders/rasterize_tiles_order.wgsl. */
+export class PixelOrder {
+  readonly #device: GPUDevice;
+  /** Of the pages that a frame shows. */
+  readonly #pages = new WeakMap<FrameBindings, readonly Recorded[]>();
+  /** By the image. */
+  readonly #bound = new WeakMap<object, { readonly key: readonly unknown[]; readonly group: GPUBindGroup }>();
+
+  constructor(device: GPUDevice) {
+    this.#device = device;
+  }
+
+  /** Finds how the depth of each visible splat differs from pixel to pixel, and other keys for the sort. To be recorded behind `project`. */
+  recordDepths(pass: GPUComputePassEncoder, bindings: FrameBindings): void {
+    let pages = this.#pages.get(bindings);
+    if (pages === undefined) this.#pages.set(bindings, (pages = this.#bindPages(bindings)));
+    for (const { kernel, group, groups } of pages) kernel.dispatch(pass, group, groups);
+  }
+
+  /** @param scratch of the frame; undefined where only pipelines are wanted */
+  paintingOf({ orderWindow }: Pick<Levers, 'orderWindow'>, camera?: Camera, scratch?: Scratch): OrderedPainting {
+    const own = { is_wide: +(orderWindow === 32), is_parallel: +(camera?.orthographic === true) };
+    return {
+      tilesKernel: (variant, depth) =>
+        rasterizeKernel(this.#device, variant, rasterizeTilesOrder, { ...own, ...depth?.overrides }),
+      bindTiles: (kernel, painted, depth) => this.#bindTiles(kernel, painted, scratch!, depth),
+    };
+  }
+
+  #bindTiles(kernel: RasterizeKernel, painted: Painted, scratch: Scratch, depth?: PaintingDepth): GPUBindGroup {
+    const own = {
+      ...{ pixel_depths: depthsIn(scratch), gathered: scratch.gathered },
+      ...(depth?.resources ?? noDepth(this.#device)),
+    };
+    const key = [kernel, ...Object.values(painted), ...Object.values(own)];
+    const known = this.#bound.get(painted.image);
+    if (known?.key.every((value, k) => value === key[k])) return known.group;
+    const group = (kernel as unknown as ComputeKernel<typeof rasterizeTilesOrder>).bind({ ...painted, ...own });
+    this.#bound.set(painted.image, { key, group });
+    return group;
+  }
+
+  #bindPages({ table, scratch }: FrameBindings): Recorded[] {
+    const { order, plan, gathered, keys } = scratch;
+    return table.pages.map((page, i) => {
+      const kernel = kernelOf<DepthsShader>(this.#device, page.reading ? pixelDepthsQuantized : pixelDepths);
+      const group = kernel.bind({
+        ...{ view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, gathered },
+        ...{ pixel_depths: depthsIn(scratch), keys: keys[0] },
+      });
+      return { kernel, group, groups: Math.ceil(Math.min(scratch.capacity, page.count) / constants.PROJECT_GROUP) };
+    });
+  }
+}
+
+/** array<PixelDepth> by slot */
+const depthsIn = (scratch: Scratch): GPUBuffer => scratch.kept('pixel_depths', layouts.PixelDepth.size);
+
+/** Either of the two shaders. */
+type DepthsShader = ShaderDescription & Pick<typeof pixelDepths, 'bindings'>;
+
+interface Recorded {
+  readonly kernel: ComputeKernel<DepthsShader>;
+  readonly group: GPUBindGroup;
+  readonly groups: number;
+}
+
+/** What is bound where there is no depth; none of it is looked at. */
+const noDepth = (device: GPUDevice): DepthResources =>
+  perDevice(device, 'order without depth', () => {
+    const texture = (usage: number): GPUTextureView =>
+      device.createTexture({ label: 'gs.no_depth', size: [1, 1], format: 'r32float', usage }).createView();
+    return {
+      scene: device.createBuffer({ label: 'gs.no_depth', size: layouts.SceneDepth.size, usage: BUFFER_USAGE.uniform }),
+      stored_depth: texture(TEXTURE_USAGE.textureBinding),
+      median_depth: texture(TEXTURE_USAGE.storageBinding),
+    };
+  });

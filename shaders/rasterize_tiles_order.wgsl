@@ -1,0 +1,285 @@
+// Paints tiles in an order of each pixel's own: by where along its ray a splat is densest (shared/pixel_depth). Splats come in the order of the tile's list. A pixel keeps
+// a window of the last ones that reach it, sorted, and blends what the next ones push out at its near end: the order is exact as long as none comes later than
+// the window is long.
+#import shared/scene_depth
+#import shared/pixel_depth
+#import shared/gathered
+#import shared/paint_tiles
+
+@group(0) @binding(6) var<storage, read> pixel_depths: array<PixelDepth>;
+@group(0) @binding(7) var<storage, read> gathered: array<u32>;
+@group(0) @binding(8) var<uniform> scene: SceneDepth;
+@group(0) @binding(9) var stored_depth: texture_2d<f32>;
+// Receives the depth at which half of the light is gone; 0 where more passes.
+@group(0) @binding(10) var median_depth: texture_storage_2d<r32float, write>;
+
+override tests_depth: bool = false;
+override tells_depth: bool = false;
+// Rays that are all parallel.
+override is_parallel: bool = false;
+// A window of 32 splats instead of 16.
+override is_wide: bool = false;
+
+// 2 ln 2: r² of u² + v² in a brush's axes.
+const RADIUS_2 = 1.3862943611198906;
+// Least 1 / depth.
+const NEARNESS_MIN = 1e-30;
+
+// Of the splats of the batch, and of the one that takes the place of a missing one: 1 / depth (depth, where rays are parallel) at the tile's corner, and by which it grows
+// across and down.
+var<workgroup> nearness: array<f32, TILE_THREADS + 1u>;
+var<workgroup> slopes: array<vec2f, TILE_THREADS + 1u>;
+
+// Depth from which steps are counted, as the bits of a float32, and the bits of such a number that a step leaves out.
+var<private> first_depth: u32;
+var<private> step_bits: u32;
+var<private> limit: f32;
+var<private> half_depth: f32;
+
+// Four splats of a pixel. Of each: its depth in 20 bits above its alpha in 12, 0 where there is none, so that nothing comes before everything else; and its colour, three numbers
+// of 9 bits with an exponent in common.
+struct Four {
+  key: vec4u,
+  color: vec4u,
+}
+
+const ALPHA_BITS = 12u;
+const ALPHA_MASK = (1u << ALPHA_BITS) - 1u;
+const DEPTH_BITS = 20u;
+const DEPTH_MASK = (1u << DEPTH_BITS) - 1u;
+
+// The window: near to far. The second half is that of wide ones.
+var<private> window_0: Four;
+var<private> window_1: Four;
+var<private> window_2: Four;
+var<private> window_3: Four;
+var<private> window_4: Four;
+var<private> window_5: Four;
+var<private> window_6: Four;
+var<private> window_7: Four;
+
+// Adding 2^23 to a whole number below it leaves the number in the lowest bits; conversions take a GPU four times as long.
+const WHOLE = 8388608.0;
+const WHOLE_BITS = 0x4b000000u;
+
+fn whole(x: f32) -> u32 { return bitcast<u32>(x + WHOLE) & 0x7fffffu; }
+fn number(bits: u32) -> f32 { return bitcast<f32>(bits | WHOLE_BITS) - WHOLE; }
+
+fn shared_exponent(color: vec3f) -> u32 {
+  let most = bitcast<u32>(max(max(color.r, color.g), max(color.b, 0x1p-16)));
+  // The exponent of what the largest is rounded to: 2^(exponent - 15) is more than that.
+  let exponent = ((most + 0x4000u) >> 23u) - 111u;
+  let steps = color * bitcast<f32>((151u - exponent) << 23u);
+  return whole(steps.r) | (whole(steps.g) << 9u) | (whole(steps.b) << 18u) | (exponent << 27u);
+}
+
+fn shared_exponent_color(bits: u32) -> vec3f {
+  let steps = vec3f(number(bits & 511u), number((bits >> 9u) & 511u), number((bits >> 18u) & 511u));
+  return steps * bitcast<f32>(((bits >> 27u) + 103u) << 23u);
+}
+
+// The colour, and how the splat bends, in the axes of the brush.
+fn packed_color(s: ProjectedSplat, slot: u32) -> vec2u {
+  return vec2u(shared_exponent(splat_color(s)), bitcast<u32>(RADIUS_2 * pixel_depths[slot].bend));
+}
+
+fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
+  let d = pixel_depths[slot];
+  slopes[k] = d.slope;
+  nearness[k] = d.nearness - dot(d.slope, s.shape.xy - tile_corner);
+}
+
+fn start_pixel(pixel: vec2u) {
+  let margin = MARGIN_OCTAVES << OCTAVE_BITS;
+  first_depth = max(~gathered[NEAREST_INVERTED], margin) - margin;
+  let range = max(gathered[FARTHEST] + margin, first_depth) - first_depth;
+  step_bits = max(32u - min(countLeadingZeros(range), 32u), DEPTH_BITS) - DEPTH_BITS;
+  if (tests_depth) { limit = depth_limit(scene, textureLoad(stored_depth, vec2u((vec2f(pixel) + 0.5) * scene.scale), 0).r); }
+}
+
+fn depth_of(key: u32) -> f32 {
+  return bitcast<f32>(first_depth + ((key >> ALPHA_BITS) << step_bits));
+}
+
+// Splat k of the batch at a pixel.
+fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
+  let brush = brushes[k];
+  let u = brush.u_x * place.x + brush.u_0;
+  let v = brush.v_x * place.x + (brush.v_y * place.y + brush.v_0);
+  let radius_2 = u * u + v * v;
+  let power = brush.power - radius_2;
+  let slope = slopes[k];
+  let linear = nearness[k] + (slope.x * place.x + slope.y * place.y);
+  var depth = max(linear, 0.0);
+  // Behind the camera nothing is densest: then the splat surrounds it.
+  if (!is_parallel) { depth = select(max(1.0 - bitcast<f32>(brush.color.y) * radius_2, 0.0) / max(linear, NEARNESS_MIN), 0.0, linear <= 0.0); }
+  let steps = min((max(bitcast<u32>(depth), first_depth) - first_depth) >> step_bits, DEPTH_MASK);
+  let alpha = min(ALPHA_MAX, exp2(power));
+  let key = (steps << ALPHA_BITS) | whole(alpha * f32(ALPHA_MASK));
+  let is_seen = power >= least_power && (!tests_depth || depth <= limit);
+  return vec2u(select(0u, key, is_seen), brush.color.x);
+}
+
+// Puts pairs in order, four at once: the nearer of each into the first.
+fn put_in_order(near: ptr<function, Four>, far: ptr<function, Four>) {
+  let a = *near;
+  let b = *far;
+  let swaps = a.key > b.key;
+  *near = Four(min(a.key, b.key), select(a.color, b.color, swaps));
+  *far = Four(max(a.key, b.key), select(b.color, a.color, swaps));
+}
+
+// Each four that first grows and then shrinks, or the other way, becomes one in order.
+fn straighten(p: ptr<function, Four>, q: ptr<function, Four>) {
+  var a = Four(vec4u((*p).key.xy, (*q).key.xy), vec4u((*p).color.xy, (*q).color.xy));
+  var b = Four(vec4u((*p).key.zw, (*q).key.zw), vec4u((*p).color.zw, (*q).color.zw));
+  put_in_order(&a, &b);
+  var c = Four(vec4u(a.key.x, b.key.x, a.key.z, b.key.z), vec4u(a.color.x, b.color.x, a.color.z, b.color.z));
+  var d = Four(vec4u(a.key.y, b.key.y, a.key.w, b.key.w), vec4u(a.color.y, b.color.y, a.color.w, b.color.w));
+  put_in_order(&c, &d);
+  *p = Four(vec4u(c.key.x, d.key.x, c.key.y, d.key.y), vec4u(c.color.x, d.color.x, c.color.y, d.color.y));
+  *q = Four(vec4u(c.key.z, d.key.z, c.key.w, d.key.w), vec4u(c.color.z, d.color.z, c.color.w, d.color.w));
+}
+
+fn backwards(four: Four) -> Four { return Four(four.key.wzyx, four.color.wzyx); }
+
+// Eight splats in any order become eight in order.
+fn sort_eight(p: ptr<function, Four>, q: ptr<function, Four>) {
+  put_in_order(p, q);
+  // Pairs of pairs.
+  var a = Four(
+    vec4u((*p).key.x, (*q).key.x, (*p).key.z, (*q).key.z), vec4u((*p).color.x, (*q).color.x, (*p).color.z, (*q).color.z),
+  );
+  var b = Four(
+    vec4u((*p).key.y, (*q).key.y, (*p).key.w, (*q).key.w), vec4u((*p).color.y, (*q).color.y, (*p).color.w, (*q).color.w),
+  );
+  put_in_order(&a, &b);
+  // Of each four the least and the greatest are known, and which two lie between.
+  var c = Four(vec4u(a.key.yw, 0u, 0u), vec4u(a.color.yw, 0u, 0u));
+  var d = Four(vec4u(b.key.xz, 0u, 0u), vec4u(b.color.xz, 0u, 0u));
+  put_in_order(&c, &d);
+  *p = Four(vec4u(a.key.x, c.key.x, d.key.x, b.key.y), vec4u(a.color.x, c.color.x, d.color.x, b.color.y));
+  *q = backwards(Four(vec4u(a.key.z, c.key.y, d.key.y, b.key.w), vec4u(a.color.z, c.color.y, d.color.y, b.color.w)));
+  put_in_order(p, q);
+  straighten(p, q);
+}
+
+// Two lists of eight, each in order, become the nearer eight and the farther eight, each in order.
+fn merge_eights(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<private, Four>, s: ptr<private, Four>) {
+  var t = backwards(*s);
+  var u = backwards(*r);
+  put_in_order(p, &t);
+  put_in_order(q, &u);
+  put_in_order(p, q);
+  straighten(p, q);
+  put_in_order(&t, &u);
+  straighten(&t, &u);
+  *r = t;
+  *s = u;
+}
+
+fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
+  let before = (*pixel).transmittance;
+  let full_weight = before * (number(key & ALPHA_MASK) / f32(ALPHA_MASK));
+  let remaining = before - full_weight;
+  let ends = remaining <= (*pixel).least;
+  var refuses = ends;
+  if (!refuses_last) { refuses = remaining <= REFUSED || is_finished(*pixel); }
+  (*pixel).least = select((*pixel).least, FINISHED, ends);
+  let after = select(remaining, before, refuses);
+  if (tells_depth && before > 0.5 && after <= 0.5) { half_depth = depth_of(key); }
+  (*pixel).color += select(full_weight, 0.0, refuses) * shared_exponent_color(color);
+  (*pixel).transmittance = after;
+}
+
+fn blend_four(pixel: ptr<function, Pixel>, four: Four) {
+  // None comes before all others.
+  if (four.key.w == 0u) { return; }
+  blend_one(pixel, four.key.x, four.color.x);
+  blend_one(pixel, four.key.y, four.color.y);
+  blend_one(pixel, four.key.z, four.color.z);
+  blend_one(pixel, four.key.w, four.color.w);
+}
+
+// The splats of the batch that touch a block, one after the other.
+struct Walk {
+  ahead: u32,
+  next_word: u32,
+}
+
+fn find_next(walk: ptr<function, Walk>, own_block: u32) {
+  while ((*walk).ahead == 0u && (*walk).next_word < BATCH_WORDS) {
+    (*walk).ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + (*walk).next_word]);
+    (*walk).next_word++;
+  }
+}
+
+fn next_found(walk: ptr<function, Walk>, own_block: u32, place: vec2f, least_power: f32) -> vec2u {
+  find_next(walk, own_block);
+  let ahead = (*walk).ahead;
+  let k = select(NO_SPLAT, ((*walk).next_word - 1u) * 32u + zeros_below(ahead), ahead != 0u);
+  (*walk).ahead = ahead & (ahead - 1u);
+  return found_at(k, place, least_power);
+}
+
+fn next_four(walk: ptr<function, Walk>, own_block: u32, place: vec2f, least_power: f32) -> Four {
+  let a = next_found(walk, own_block, place, least_power);
+  let b = next_found(walk, own_block, place, least_power);
+  let c = next_found(walk, own_block, place, least_power);
+  let d = next_found(walk, own_block, place, least_power);
+  return Four(vec4u(a.x, b.x, c.x, d.x), vec4u(a.y, b.y, c.y, d.y));
+}
+
+fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, least_power: f32) {
+  var walk = Walk(0u, 0u);
+  loop {
+    find_next(&walk, own_block);
+    if (walk.ahead == 0u || is_finished(*pixel)) { break; }
+    var p = next_four(&walk, own_block, place, least_power);
+    var q = next_four(&walk, own_block, place, least_power);
+    sort_eight(&p, &q);
+    // What leaves the window at its near end leaves it in order; what comes goes to its place.
+    merge_eights(&p, &q, &window_0, &window_1);
+    var leaving_p = p;
+    var leaving_q = q;
+    p = window_0;
+    q = window_1;
+    merge_eights(&p, &q, &window_2, &window_3);
+    window_0 = p;
+    window_1 = q;
+    if (is_wide) {
+      p = window_2;
+      q = window_3;
+      merge_eights(&p, &q, &window_4, &window_5);
+      window_2 = p;
+      window_3 = q;
+      p = window_4;
+      q = window_5;
+      merge_eights(&p, &q, &window_6, &window_7);
+      window_4 = p;
+      window_5 = q;
+    }
+    blend_four(pixel, leaving_p);
+    blend_four(pixel, leaving_q);
+  }
+}
+
+fn paint_rest(pixel: ptr<function, Pixel>) {
+  blend_four(pixel, window_0);
+  blend_four(pixel, window_1);
+  blend_four(pixel, window_2);
+  blend_four(pixel, window_3);
+  if (is_wide) {
+    blend_four(pixel, window_4);
+    blend_four(pixel, window_5);
+    blend_four(pixel, window_6);
+    blend_four(pixel, window_7);
+  }
+}
+
+fn clear_notes(lane: u32) {}
+fn keep_notes(k: u32) {}
+
+fn note_pixel(pixel: vec2u) {
+  if (tells_depth) { textureStore(median_depth, pixel, vec4f(half_depth)); }
+}

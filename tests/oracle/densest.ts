@@ -1,0 +1,60 @@
+/** Where along a ray a splat is densest: the depths of an order for each pixel (Radl et al. 2024), of the splat as it is painted, filter included. */
+import type { Camera, GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { linearPart, rotationTimesScale } from './projection.js';
+import type { Rules } from './rules.js';
+
+/** For splat `i` with its centre at `center` in camera axes: the depth at which it is densest along the ray of a pixel, 0 if that is behind the camera. */
+export function densestDepth(
+  cloud: GaussianCloud,
+  i: number,
+  camera: Camera,
+  center: Vector3,
+  rules: Rules,
+): (column: number, row: number) => number {
+  const { fx, fy, cx, cy, orthographic } = camera;
+  const [x, y, z] = center;
+  const axes = rotationTimesScale(cloud, i);
+  const turned = linearPart(camera).map((row) =>
+    [0, 1, 2].map((k) => row[0] * axes[0][k] + row[1] * axes[1][k] + row[2] * axes[2][k]),
+  );
+  const covariance = turned.map((a) => turned.map((b) => dot(a, b)));
+  // The filter widens the image across and down by its variance in pixels: a Gaussian of the size of that at the splat's depth.
+  const shrink = orthographic ? 1 : z;
+  covariance[0][0] += rules.dilation * (shrink / fx) ** 2;
+  covariance[1][1] += rules.dilation * (shrink / fy) ** 2;
+  // What is flat in the direction of the ray, where the filter adds nothing, has no inverse: next to nothing makes it one.
+  const thickness = 1e-14 * (covariance[0][0] + covariance[1][1] + covariance[2][2]);
+  for (const k of [0, 1, 2]) covariance[k][k] += thickness;
+  const inverse = inverse3(covariance);
+  if (orthographic) {
+    // Along (dx, dy, t) from the centre the exponent is least where its derivative by t is 0.
+    const [a, b, c] = inverse[2];
+    return (column, row) => Math.max(0, z - (a * ((column + 0.5 - cx) / fx - x) + b * ((row + 0.5 - cy) / fy - y)) / c);
+  }
+  const toCenter = inverse.map((row) => dot(row, center));
+  return (column, row) => {
+    const ray = [(column + 0.5 - cx) / fx, (row + 0.5 - cy) / fy, 1];
+    // (t·ray - center)ᵀ A (t·ray - center) is least at t = rayᵀ A center / rayᵀ A ray.
+    return Math.max(
+      0,
+      dot(ray, toCenter) /
+        dot(
+          ray,
+          inverse.map((line) => dot(line, ray)),
+        ),
+    );
+  };
+}
+
+function inverse3([a, b, c]: number[][]): number[][] {
+  const rows = [cross(b, c), cross(c, a), cross(a, b)];
+  const determinant = dot(a, rows[0]);
+  return [0, 1, 2].map((k) => rows.map((row) => row[k] / determinant));
+}
+
+const cross = (a: readonly number[], b: readonly number[]): number[] => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
+const dot = (a: readonly number[], b: readonly number[]): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
