@@ -14,6 +14,7 @@ const ENTRIES = [
   'run/fetch-worker',
   'stability',
   'start',
+  'world',
   'quality/oracle-worker',
   'peers/playcanvas',
   'peers/spark',

@@ -109,3 +109,29 @@ test(
     );
   },
 );
+
+test('the page of several scenes: as one, as two, as ten, moved, added, reordered', { timeout: 180_000 }, async () => {
+  const query = { n: '20000', width: '48', height: '32', frames: '2', rounds: '1', warmup: '1' };
+  const report = await runPage('bench/world.html', { ...query, options: '{"shDegree":0}' });
+  assert.equal(report.error, undefined);
+  assert.deepEqual(report.errors, []);
+  for (const { name, ratio, burst, facts } of report.results) {
+    assert.ok(ratio.burst.p50 > 0 && burst.p50 > 0, name);
+    assert.equal(facts.own.splats, facts.standard.splats, `${name}: the same splats`);
+    const isStill = !/moved|faded/.test(name);
+    if (isStill)
+      assert.equal(facts.own.statistics.visible, facts.standard.statistics.visible, `${name}: as many visible`);
+  }
+  const [two, ten, moved] = report.results;
+  assert.deepEqual(
+    [two, ten, moved].map(({ facts }) => facts.own.scenes),
+    [2, 10, 10],
+  );
+  assert.ok(report.changes.alone > 0);
+  for (const { name, grown, allocated, allocatedAfter } of report.changes.rows) {
+    assert.equal(allocatedAfter.buffers, 0, `${name}: the frames after it allocate nothing`);
+    if (name.startsWith('one is added')) assert.ok(grown <= report.changes.alone, `${name}: ${grown} bytes`);
+    // The list of pages is written anew: some bytes for each scene.
+    if (name.startsWith('all')) assert.ok(grown === 0 && allocated.bytes < 1024, `${name}: ${allocated.bytes} bytes`);
+  }
+});

@@ -138,12 +138,38 @@ const SERVERS: Readonly<Record<string, [outcome: string, answer: Answer]>> = {
     'right',
     then(partOr((response) => void response.writeHead(206, { ETag: '"a"', 'Content-Range': 'x' }).end('garbage'))),
   ],
+  'a break, and the rest of a file of another length': [
+    'right',
+    then(
+      partOr((response, from) => {
+        const range = `bytes ${from}-${CONTENT.length + 4999}/${CONTENT.length + 5000}`;
+        const rest = Buffer.concat([CONTENT.subarray(from), new Uint8Array(5000)]);
+        response.writeHead(206, { ETag: '"a"', 'Content-Length': rest.length, 'Content-Range': range }).end(rest);
+      }),
+    ),
+  ],
+  'a break, and less than the rest': [
+    'network/interrupted',
+    then((response, from) => {
+      const range = `bytes ${from}-${CONTENT.length - 1}/${CONTENT.length}`;
+      response.writeHead(206, { ETag: '"a"', 'Content-Range': range }).end(CONTENT.subarray(from, from + 500));
+    }),
+  ],
   'a break, and an empty part': ['right', then(partOr((response) => void response.writeHead(206).end()))],
   'a break, and no such part': ['right', then(partOr((response) => void response.writeHead(416).end()))],
   'a break, and 503 for ever': ['network/interrupted', then((response) => void response.writeHead(503).end())],
   'a break, and silence': ['network/interrupted', then(() => undefined)],
   '429 twice': ['right', (response) => (requests < 3 ? void response.writeHead(429).end() : whole(response))],
+  '429 for ever': ['network/status', (response) => void response.writeHead(429, { 'Retry-After': '9999' }).end()],
   '503 for ever': ['network/status', (response) => void response.writeHead(503).end()],
+  'a part that nobody asked for': [
+    'network/status',
+    (response) =>
+      void response
+        .writeHead(206, { 'Content-Range': `bytes 0-${BREAK - 1}/${CONTENT.length}` })
+        .end(CONTENT.subarray(0, BREAK)),
+  ],
+  'nothing, and status 204': ['network/status', (response) => void response.writeHead(204).end()],
   'status 404': ['network/status', (response) => void response.writeHead(404).end('<html>')],
   'status 500': ['network/status', (response) => void response.writeHead(500).end()],
   'a redirect to itself': [

@@ -31,7 +31,8 @@ export class Download {
   /** Asks for the whole file. @returns the error of a server that has no time now. */
   async start(): Promise<Error | undefined> {
     const response = await this.#request({});
-    if (response.ok) return void this.#begin(response);
+    // What is said to be a part, or nothing, is no file, though nobody would call it an error.
+    if (response.status === 200 || response.status === 203) return void this.#begin(response);
     await discard(response);
     const error = badStatus(this.#address, response);
     if (response.status === 429 || response.status === 503) return error;
