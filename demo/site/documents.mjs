@@ -29,7 +29,10 @@ const SECTIONS = [
     [guide('own-generator'), /^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/],
   ],
   ['Accuracy and speed', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
-  ['Without the element', [guide(''), /^packages\/(renderer|three|formats|core|cli)\/README/, /^docs\/detail-pages/]],
+  [
+    'Without the element',
+    [guide(''), /^packages\/(renderer|three|formats|core|cli)\/README/, /^docs\/(detail-pages|sequences)/],
+  ],
   ['For contributors', [/^CONTRIBUTING/, /^docs\/architecture/, /^packages\//, /^scripts\//, /^README/]],
   ['Decisions', [/^docs\/decisions\//]],
   ['About', [/^CHANGELOG/, /^SECURITY/, /^LICENSE/, /ATTRIBUTION/, /^docs\//]],

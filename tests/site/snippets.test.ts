@@ -237,7 +237,10 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
     route.fulfill({ path: join(root, 'demo/scenes/skull-poster.webp') }),
   );
   await tab.route('**/dancer.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
-  await tab.route('**/frame-*.spz', (route) => route.fulfill({ body: bodies.get(new URL(route.request().url()).pathname.slice(1)) })); // prettier-ignore
+  await tab.route(/\/(first\.spz|motion-0\.bin)$/, (route) =>
+    route.fulfill({ body: bodies.get(new URL(route.request().url()).pathname.split('/').pop()!) }),
+  );
+  await tab.route('**/sequence.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
   await tab.route('**/style.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/post-fixed.onnx') }));
   await tab.route('**/walker.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/packed.onnx') }));
 }

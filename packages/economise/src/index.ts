@@ -4,7 +4,7 @@ export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
 export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, type Image } from './measure.js';
 export type { TaskPool } from './parts/task-pool.js';
-export { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
+export { degreesOf, reduce, splatsOf, type Cut, type ReducedCloud } from './reduce.js';
 export { RefiningEvaluator, type RefiningOptions } from './refine/refining-evaluator.js';
 export type { Descent, Rates } from './refine/scene-fitter.js';
 export type { LoweredColours, Ranking, Scores } from './score.js';
@@ -20,3 +20,5 @@ export {
 export { encodingsFor, type Encoding } from './write/index.js';
 export { allocateSteps, scaledSteps, type AllocateOptions, type Steps } from './allocate-steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
+export { writeMotion, type MotionOptions, type MotionSteps } from './write/motion.js';
+export { withNearAxes } from './write/near-axes.js';

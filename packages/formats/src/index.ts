@@ -11,7 +11,29 @@ export { readPrefix } from './read-prefix.js';
 export { MOST_DROPPED, readScene, type ReadSceneOptions } from './read-scene.js';
 export { isSequence } from './is-sequence.js';
 export type { FileBytes } from './bytes.js';
-export { frameAt, framePath, parseSequence, type FramePattern, type SceneSequence } from './sequence.js';
+export {
+  frameAt,
+  framePath,
+  movedFrame,
+  parseSequence,
+  sequencePaths,
+  type FramePattern,
+  type MovedFrame,
+  type SceneSequence,
+  type SequenceMotion,
+} from './sequence.js';
+export {
+  MOTION_MODES,
+  MOTION_VERSION,
+  movedCloud,
+  MOVING,
+  MOVING_NAMES,
+  readMotion,
+  type Motion,
+  type MotionFile,
+  type MovingName,
+  type MovingPart,
+} from './motion.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { HEADER_BYTES, readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
 export { samplePreview } from './preview.js';

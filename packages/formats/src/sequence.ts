@@ -2,17 +2,36 @@ import { LoadBudget } from './budget.js';
 import { grouped } from './bytes.js';
 import { damaged } from './damaged.js';
 import { MAX_MANIFEST_BYTES } from './is-sequence.js';
-import { parseJson, show } from './json.js';
+import { parseJson, show, type Json } from './json.js';
 
 /** Scene files that follow one another in time. */
 export interface SceneSequence {
-  /** Paths relative to the manifest, in order, or how they are made; each is a scene file of any format. See {@link framePath}. */
+  /** Paths relative to the manifest, in order, or how they are made. Each is a scene file of any format; with {@link motion} only the first is. See {@link framePath}. */
   readonly frames: readonly string[] | FramePattern;
+  /** Files of what the frames after the first differ by from it: see {@link motionPath}. Undefined: each frame is a scene file. */
+  readonly motion?: SequenceMotion;
   /** Number of frames. */
   readonly frameCount: number;
   readonly framesPerSecond: number;
   /** Seconds from the first frame to the end of the last. */
   readonly durationSeconds: number;
+}
+
+/** Where the frames after the first are. */
+export interface SequenceMotion {
+  /** Paths of the files of motion, as {@link SceneSequence.frames}. */
+  readonly frames: readonly string[] | FramePattern;
+  /** Frames of a file, but for the last, which has what is left. */
+  readonly framesPerFile: number;
+}
+
+/** A frame as the one of a file of motion. */
+export interface MovedFrame {
+  /** Path of the file, relative to the manifest. */
+  readonly path: string;
+  /** Number of the frame in the file, and how many the file has. */
+  readonly frame: number;
+  readonly frames: number;
 }
 
 /** Numbered paths. */
@@ -26,10 +45,14 @@ export interface FramePattern {
 }
 
 const MAX_FRAMES = 1_000_000;
+/** Frames of a file of motion: their curves are small against what the splats follow of them. */
+const MAX_PER_FILE = 4096;
 /** Digits of a number at most: more than are exact. */
 const MAX_DIGITS = 15;
 /** `frame-{0001}.spz`: the digits say where numbering begins, and how many digits numbers have at least. */
 const PATTERN = /^([^{}]*)\{(\d+)\}([^{}]*)$/;
+
+type Fail = (path: string, expected: string, found: unknown) => never;
 
 /**
  * Reads the manifest of a sequence:
@@ -37,6 +60,7 @@ const PATTERN = /^([^{}]*)\{(\d+)\}([^{}]*)$/;
  * ```json
  * { "gaussianSplatSequence": 1, "framesPerSecond": 24, "frames": ["a.spz", "b.spz"] }
  * { "gaussianSplatSequence": 1, "framesPerSecond": 24, "frames": "frame-{0001}.spz", "count": 240 }
+ * { "gaussianSplatSequence": 2, "framesPerSecond": 24, "count": 240, "first": "first.sog", "motion": "motion-{00}.bin", "framesPerFile": 48 }
  * ```
  *
  * @throws GaussianSplatError `decode/corrupt`, `decode/truncated`, `decode/header` or `decode/unsupported`.
@@ -47,8 +71,8 @@ export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
     throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
   };
   const { gaussianSplatSequence: version, framesPerSecond, frames, count } = json;
-  if (version !== 1) {
-    throw damaged(`${name}, gaussianSplatSequence`, 'version 1', show(version), 'decode/unsupported');
+  if (version !== 1 && version !== 2) {
+    throw damaged(`${name}, gaussianSplatSequence`, 'version 1 or 2', show(version), 'decode/unsupported');
   }
   if (!(Number.isFinite(framesPerSecond) && (framesPerSecond as number) > 0 && (framesPerSecond as number) <= 1000)) {
     fail('framesPerSecond', 'a number above 0, 1000 at most', framesPerSecond);
@@ -59,12 +83,44 @@ export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
     framesPerSecond: framesPerSecond as number,
     durationSeconds: frameCount / (framesPerSecond as number),
   });
-  if (typeof frames === 'string') return sequence(patternOf(frames, count, fail), count as number);
-  const isList = Array.isArray(frames) && frames.length > 0 && frames.length <= MAX_FRAMES;
-  if (!isList || !frames.every((path) => typeof path === 'string' && path !== '')) {
-    return fail('frames', `1 to ${grouped(MAX_FRAMES)} paths, or one with {0001} in it`, frames);
+  if (version === 2) return { ...sequence([firstOf(json, fail)], countOf(count, fail)), motion: motionOf(json, fail) };
+  if (typeof frames === 'string') return sequence(patternOf(frames, 'frames', fail), countOf(count, fail));
+  const paths = pathsOf(frames, 'frames', fail);
+  return sequence(paths, paths.length);
+}
+
+function firstOf({ first }: Json, fail: Fail): string {
+  return typeof first === 'string' && first !== '' ? first : fail('first', 'the path of a scene file', first);
+}
+
+/** Files for all frames but the first. */
+function motionOf({ motion, framesPerFile, count }: Json, fail: Fail): SequenceMotion {
+  if (!Number.isInteger(framesPerFile) || (framesPerFile as number) < 1 || (framesPerFile as number) > MAX_PER_FILE) {
+    fail('framesPerFile', `1 to ${grouped(MAX_PER_FILE)}`, framesPerFile);
   }
-  return sequence(frames as string[], frames.length);
+  const most = Math.ceil(((count as number) - 1) / (framesPerFile as number));
+  const isPattern = typeof motion === 'string';
+  const files = isPattern ? patternOf(motion, 'motion', fail) : pathsOf(motion, 'motion', fail, most);
+  if (Array.isArray(files) && files.length !== most) fail('motion', `${grouped(most)} paths`, files.length);
+  return { frames: files, framesPerFile: framesPerFile as number };
+}
+
+/** Where a frame is that is not in a scene file of its own; undefined for one that is. */
+export function movedFrame({ motion, frameCount }: SceneSequence, frame: number): MovedFrame | undefined {
+  if (motion === undefined || frame === 0) return undefined;
+  const { framesPerFile } = motion;
+  const file = Math.floor((frame - 1) / framesPerFile);
+  const begins = 1 + framesPerFile * file;
+  const frames = Math.min(framesPerFile, frameCount - begins);
+  return { path: framePath(motion, file), frame: frame - begins, frames };
+}
+
+/** Paths of all files, in the order in which frames need them. */
+export function* sequencePaths(sequence: SceneSequence): Generator<string> {
+  const { motion, frameCount } = sequence;
+  const own = motion ? 1 : frameCount;
+  for (let frame = 0; frame < own; frame++) yield framePath(sequence, frame);
+  for (let file = 0; motion && file * motion.framesPerFile < frameCount - 1; file++) yield framePath(motion, file);
 }
 
 /** Path of a frame, relative to the manifest: of a pattern it is made now, for a short one may stand for a million. */
@@ -85,13 +141,19 @@ export function frameAt(
   return loop ? ((frame % frameCount) + frameCount) % frameCount : Math.min(frameCount - 1, Math.max(0, frame || 0));
 }
 
-type Fail = (path: string, expected: string, found: unknown) => never;
-
-function patternOf(pattern: string, count: unknown, fail: Fail): FramePattern {
-  const [, before, digits, behind] = PATTERN.exec(pattern) ?? fail('frames', 'a path with {0001} in it', pattern);
-  if (!Number.isInteger(count) || (count as number) < 1 || (count as number) > MAX_FRAMES) {
-    fail('count', `1 to ${grouped(MAX_FRAMES)} frames`, count);
-  }
-  if (digits.length > MAX_DIGITS) fail('frames', `at most ${MAX_DIGITS} digits`, `${digits.length} of them`);
+function patternOf(pattern: string, path: string, fail: Fail): FramePattern {
+  const [, before, digits, behind] = PATTERN.exec(pattern) ?? fail(path, 'a path with {0001} in it', pattern);
+  if (digits.length > MAX_DIGITS) fail(path, `at most ${MAX_DIGITS} digits`, `${digits.length} of them`);
   return { before, behind, first: Number(digits), digits: digits.length };
+}
+
+function pathsOf(paths: unknown, path: string, fail: Fail, least = 1): readonly string[] {
+  const isList = Array.isArray(paths) && paths.length >= Math.min(1, least) && paths.length <= MAX_FRAMES;
+  if (isList && paths.every((each) => typeof each === 'string' && each !== '')) return paths as string[];
+  return fail(path, `1 to ${grouped(MAX_FRAMES)} paths, or one with {0001} in it`, paths);
+}
+
+function countOf(count: unknown, fail: Fail): number {
+  if (Number.isInteger(count) && (count as number) >= 1 && (count as number) <= MAX_FRAMES) return count as number;
+  return fail('count', `1 to ${grouped(MAX_FRAMES)} frames`, count);
 }

@@ -58,9 +58,8 @@ async function partsOf(file) {
   const bytes = readFileSync(file);
   const json = JSON.parse(bytes.toString('utf8').replace(/^\ufeff/, ''));
   if (json.gaussianSplatSequence !== undefined) {
-    const { framePath, parseSequence } = await import('@gaussian-splat/formats');
-    const sequence = parseSequence(bytes, file);
-    return Array.from({ length: sequence.frameCount }, (_, frame) => framePath(sequence, frame));
+    const { parseSequence, sequencePaths } = await import('@gaussian-splat/formats');
+    return [...sequencePaths(parseSequence(bytes, file))];
   }
   const names = [];
   const open = [json];

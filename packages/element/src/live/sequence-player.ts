@@ -1,9 +1,9 @@
 /** Loaded only when a sequence is shown. */
 import { partRequest, type Bounds } from '@gaussian-splat/core';
-import { frameAt, framePath, type SceneSequence } from '@gaussian-splat/formats';
+import { frameAt, framePath, movedFrame, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { FileRequest, LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { FrameRoom } from './frame-room.js';
 import type { LiveListeners, LiveState, Timeline } from './live-model.js';
@@ -53,7 +53,8 @@ export class SequencePlayer implements Timeline {
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, Slot>();
-  readonly #failures = new Map<number, Failure>();
+  /** By the path of the file that did not come. */
+  readonly #failures = new Map<string, Failure>();
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
   #shown = 0;
@@ -79,7 +80,7 @@ export class SequencePlayer implements Timeline {
   /** With its first frame on the GPU. Rejects with GaussianSplatError, or the signal's reason. */
   static async open(sequence: LoadedSequence, options: SequenceOptions): Promise<SequencePlayer> {
     const { device, signal, onProgress, memoryBudget, beforeUpload } = options;
-    const first = await load(framePath(sequence, 0), options, 'auto', signal, onProgress);
+    const first = await load(sequence, 0, options, 'auto', signal, onProgress);
     signal.throwIfAborted();
     beforeUpload(bytesOf(first.packed));
     const gaussians = await SequenceGaussians.create(device, first.packed, { memoryBudget });
@@ -185,15 +186,23 @@ export class SequencePlayer implements Timeline {
 
   /** True of a frame that has not come, until it is asked for again. */
   #isMissing(frame: number): boolean {
-    return performance.now() < (this.#failures.get(frame)?.until ?? -Infinity);
+    return performance.now() < (this.#failures.get(this.#fileOf(frame))?.until ?? -Infinity);
+  }
+
+  /** Path of what a frame needs: those of one file of motion come, or are missing, together. */
+  #fileOf(frame: number): string {
+    return movedFrame(this.#sequence, frame)?.path ?? framePath(this.#sequence, frame);
   }
 
   /** A frame cannot be had: that is told once, and it is asked for ever more rarely, then no more. */
   #fail(frame: number, error: unknown): void {
     this.#slots.delete(frame);
-    const times = (this.#failures.get(frame)?.times ?? 0) + 1;
+    // Of the frames of one file that have been waited for the first has said it.
+    if (this.#isMissing(frame)) return;
+    const file = this.#fileOf(frame);
+    const times = (this.#failures.get(file)?.times ?? 0) + 1;
     const until = times < MOST_TRIES ? performance.now() + RETRY_MS * 4 ** (times - 1) : Infinity;
-    this.#failures.set(frame, { times, until });
+    this.#failures.set(file, { times, until });
     if (times === 1 && !this.#isClosed) this.#options.listeners.onError(error);
   }
 
@@ -209,9 +218,9 @@ export class SequencePlayer implements Timeline {
     const { listeners } = this.#options;
     const { shPrecision } = this.#gaussians;
     try {
-      const path = framePath(this.#sequence, frame);
-      slot.packed = (await load(path, this.#options, shPrecision, slot.abort.signal, () => undefined)).packed;
-      this.#failures.delete(frame);
+      const loading = load(this.#sequence, frame, this.#options, shPrecision, slot.abort.signal, () => undefined);
+      slot.packed = (await loading).packed;
+      this.#failures.delete(this.#fileOf(frame));
       this.#room.note(bytesOf(slot.packed));
     } catch (error) {
       if (slot.abort.signal.aborted) return;
@@ -223,21 +232,32 @@ export class SequencePlayer implements Timeline {
 }
 
 async function load(
-  path: string,
+  sequence: SceneSequence,
+  frame: number,
   { loader, request, frameUrl }: SequenceOptions,
-  sh: SceneRequest['sh'],
+  precision: SceneRequest['sh'],
   signal: AbortSignal,
   onProgress: ProgressListener,
 ): Promise<LoadedScene> {
   const { limits } = request;
-  const own = partRequest(path, request, limits?.origins);
-  // What the page has made of an address is not changed.
-  const { href } = new URL(path, request.url);
-  const asked = frameUrl(href);
-  return loader.load(
-    { ...own, ...(asked !== href && { url: asked }), limits, sh: request.sh === 'auto' ? sh : request.sh },
+  const sh = request.sh === 'auto' ? precision : request.sh;
+  const asked = (path: string): FileRequest => {
+    const own = partRequest(path, request, limits?.origins);
+    // What the page has made of an address is not changed.
+    const { href } = new URL(path, request.url);
+    const url = frameUrl(href);
+    return { ...own, ...(url !== href && { url }), limits };
+  };
+  if (sequence.motion === undefined)
+    return loader.load({ ...asked(framePath(sequence, frame)), sh }, signal, onProgress);
+  const moved = movedFrame(sequence, frame);
+  const motion = moved && { ...asked(moved.path), frame: moved.frame, frames: moved.frames };
+  const wanted = { first: asked(framePath(sequence, 0)), motion, sh, limits };
+  return loader.ask(
+    { type: 'frame', request: wanted },
     signal,
-    onProgress,
+    ({ readMovedFrame }) => readMovedFrame(wanted, signal, onProgress),
+    { onProgress },
   );
 }
 

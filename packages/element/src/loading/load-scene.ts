@@ -13,6 +13,7 @@ import {
 import { packGaussians } from '@gaussian-splat/renderer';
 import type { LargePly } from './large-ply.js';
 import type { PreviewSchedule } from './preview-schedule.js';
+import type * as sequences from './sequence-of.js';
 import { ProgressSum } from './progress-sum.js';
 import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
 
@@ -82,7 +83,7 @@ export async function loadScene(
     const joined = await (await shared?.ply)?.finish(bytes);
     if (joined) return joined;
     if (isSequence(bytes)) {
-      const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
+      const { parseSequence } = await loadSequenceCode();
       return parseSequence(bytes, name);
     }
     // Nothing lies beside what has no place.
@@ -108,6 +109,9 @@ export async function loadScene(
     throw named(error, fileName(request.url));
   }
 }
+
+export const loadSequenceCode = (): Promise<typeof sequences> =>
+  loadModule('the code that reads sequences', () => import('./sequence-of.js'));
 
 /** The limits of a load that begins now, with the seconds that are left whenever they are asked for. */
 export function limitsFrom({ limits }: Pick<SceneRequest, 'limits'>): () => LoadLimits {

@@ -69,6 +69,15 @@ export interface LoadedScene {
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */
 export type LoadedSequence = SceneSequence;
 
+/** A frame of a sequence whose splats are those of the first: all that the worker must know, for it may have been ended meanwhile. */
+export interface MovedFrameRequest {
+  readonly first: FileRequest;
+  /** The file with what this frame differs by, its number there, and the frames of the file; absent for the first frame. */
+  readonly motion?: (FileRequest & { readonly frame: number; readonly frames: number }) | undefined;
+  readonly sh: SceneRequest['sh'];
+  readonly limits?: SceneLimits | undefined;
+}
+
 /** A streamed SOG scene of which the coarsest levels are there. */
 export interface LoadedBoxes {
   readonly levels: LevelScene;
@@ -105,6 +114,7 @@ export type WorkerRequest =
   | { readonly type: 'manifest'; readonly request: FileRequest }
   | { readonly type: 'boxes'; readonly request: SceneRequest }
   | { readonly type: 'box'; readonly request: BoxRequest }
+  | { readonly type: 'frame'; readonly request: MovedFrameRequest }
   | { readonly type: 'model'; readonly request: ModelRequest };
 
 export type PageMessage =

@@ -6,13 +6,15 @@ import { loadModule, type OpenedModel } from '@gaussian-splat/core';
 import type { DetailManifest } from '@gaussian-splat/renderer';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
-import { loadScene, named } from './load-scene.js';
+import { loadScene, loadSequenceCode, named } from './load-scene.js';
 import type * as boxes from './lod-boxes.js';
 import type {
   BoxRequest,
   FileRequest,
   LoadedBoxes,
+  LoadedScene,
   ModelRequest,
+  MovedFrameRequest,
   PageMessage,
   ProgressListener,
   SceneRequest,
@@ -33,6 +35,12 @@ export const openBoxes = async (
 
 export const readBox = async (request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> =>
   (await loadBoxCode()).readBox(request, signal);
+
+export const readMovedFrame = async (
+  request: MovedFrameRequest,
+  signal: AbortSignal,
+  onProgress?: ProgressListener,
+): Promise<LoadedScene> => (await loadSequenceCode()).readMovedFrame(request, signal, onProgress);
 
 export const openManifest = async (
   request: FileRequest,
@@ -110,6 +118,10 @@ function serve(scope: WorkerScope): void {
     scope.postMessage({ type: 'reading', id });
     if (message.type === 'levels') return buildLevels(message, signal);
     if (message.type === 'box') return whole(readBox(message.request, signal));
+    if (message.type === 'frame') {
+      const scene = await readMovedFrame(message.request, signal, progressOf(id));
+      return [scene, buffersOf(scene.packed)];
+    }
     if (message.type === 'model') {
       const model = await openModel(message.request, signal);
       return [model, model.whole ? [model.whole.buffer as ArrayBuffer] : []];

@@ -1,2 +1,102 @@
-/** Loaded only for the manifest of a sequence. */
+/** Loaded only for sequences: for the manifest of one, and for frames that are told by what they differ by from the first. */
+import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  fetchScene,
+  LoadBudget,
+  movedCloud,
+  openPartAt,
+  readMotion,
+  readScene,
+  type FetchSceneOptions,
+  type Motion,
+} from '@gaussian-splat/formats';
+import { packGaussians } from '@gaussian-splat/renderer';
+import type { SceneBounds } from '../camera/settings.js';
+import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
+import { ProgressSum } from './progress-sum.js';
+import type { FileRequest, LoadedScene, MovedFrameRequest, ProgressListener } from './protocol.js';
+import { SharedReads } from './shared-reads.js';
+
 export { parseSequence } from '@gaussian-splat/formats';
+
+/** The first frame of a sequence, and how many bytes it arrived as. */
+interface First {
+  readonly cloud: GaussianCloud;
+  readonly bounds: SceneBounds;
+  readonly arrived: number;
+}
+
+/** Of all sequences of the page. */
+const firsts = new SharedReads<First>(({ cloud }) => 4 * cloud.count * (11 + cloud.sh.length / cloud.count));
+const motions = new SharedReads<Motion & { arrived: number }>(({ splats, parts }) =>
+  Object.values(parts).reduce((sum, { codes }) => sum + 2 * splats * codes.length, 0),
+);
+
+/**
+ * Reads and packs a frame. Files that several frames need are read once. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that
+ * is aborted.
+ */
+export async function readMovedFrame(
+  { first, motion, sh, limits }: MovedFrameRequest,
+  signal: AbortSignal,
+  onProgress?: ProgressListener,
+): Promise<LoadedScene> {
+  const name = fileName((motion ?? first).url);
+  try {
+    const left = limitsFrom({ limits });
+    const begun = await firsts.read(first.url, (aborted) => readFirst(first, left, aborted, onProgress), signal);
+    const { bounds } = begun;
+    const pack = (cloud: GaussianCloud): LoadedScene => ({
+      ...{ packed: packGaussians(cloud, { sh }), bounds },
+      warnings: cloud.warnings,
+    });
+    if (motion === undefined) return pack(begun.cloud);
+    const { url, frame, frames } = motion;
+    const moved = await motions.read(
+      url,
+      async (aborted) => {
+        const bytes = await fetchScene(url, { ...optionsOf(motion, aborted), ...fileLimits(left()) });
+        const budget = new LoadBudget(bytes.length, left());
+        const own = await readMotion({ bytes, name, splats: begun.cloud.count, frames, budget });
+        return { ...own, arrived: bytes.length };
+      },
+      signal,
+    );
+    const budget = new LoadBudget(begun.arrived + moved.arrived, left());
+    return pack(movedCloud(begun.cloud, moved, frame, name, budget));
+  } catch (error) {
+    signal.throwIfAborted();
+    throw named(error, name);
+  }
+}
+
+const optionsOf = ({ credentials }: FileRequest, signal: AbortSignal): FetchSceneOptions => ({
+  ...{ mode: 'cors', credentials, signal },
+});
+
+async function readFirst(
+  request: FileRequest,
+  left: ReturnType<typeof limitsFrom>,
+  signal: AbortSignal,
+  onProgress: ProgressListener = () => undefined,
+): Promise<First> {
+  const { url } = request;
+  const progress = new ProgressSum(throttled(onProgress), true);
+  let arrived = 0;
+  const options = (): FetchSceneOptions => ({
+    ...{ ...optionsOf(request, signal), onProgress: progress.add() },
+    ...fileLimits(left()),
+  });
+  const openPart = openPartAt(url, options);
+  const bytes = await fetchScene(url, options());
+  const cloud = await readScene(bytes, {
+    ...{ name: fileName(url), signal },
+    openPart: async (path, query) => {
+      const part = await openPart(path, query);
+      arrived += part.byteLength;
+      return part;
+    },
+    ...left(),
+  });
+  return { cloud, bounds: { ...boundsOf(cloud), up: cloud.hints?.up }, arrived: arrived + bytes.length };
+}

@@ -5,7 +5,7 @@ import { extname, join, normalize } from 'node:path';
 import { Readable } from 'node:stream';
 import { setTimeout as delay } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
-import { gzipSync } from 'node:zlib';
+import { constants, deflateRawSync, gzipSync } from 'node:zlib';
 import { DEVELOPMENT_APP, developmentScript, frameworkScript, plainApp } from './apps.mjs';
 
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
@@ -159,6 +159,24 @@ const ANSWERS = {
     if (frame > 0) await delay(Number(ms));
     if (String(frame) === lost) return void (context.status = 404);
     context.body = ball(200 + 20 * (frame % 12), COLOURS[frame % 3]);
+  },
+
+  /** A sequence of one ball that changes its colour and place: its first frame, and files of motion of four frames each. `lost` is one that is not there. */
+  async moving(context, name) {
+    const { count = '12', lost } = context.query;
+    const manifest = { gaussianSplatSequence: 2, framesPerSecond: 10, count: Number(count), framesPerFile: 4 };
+    if (name.endsWith('.json')) {
+      context.body = JSON.stringify({
+        ...manifest,
+        first: 'ball.splat',
+        motion: `{0}.bin?count=${count}&lost=${lost}`,
+      });
+      return;
+    }
+    if (name === 'ball.splat') return void (context.body = ball(200, COLOURS[0]));
+    const file = Number.parseInt(name, 10);
+    if (String(file) === lost) return void (context.status = 404);
+    context.body = Buffer.from(await motionOf(1 + 4 * file, Math.min(4, Number(count) - 1 - 4 * file)));
   },
 
   /** A sequence of two frames for whoever has a token, red, or a signature, blue; for nobody else. */
@@ -429,6 +447,22 @@ function ball(count, colour, size = Math.max(0.05, 2 / Math.sqrt(count))) {
     bytes.set([...colour, 220, 255, 128, 128, 128], at + 24);
   }
   return bytes;
+}
+
+/** Frames of the sequence `moving`, as a file of motion. */
+async function motionOf(begin, count) {
+  const { writeMotion } = await import('@gaussian-splat/economise');
+  const { readScene } = await import('@gaussian-splat/formats');
+  const first = await readScene(ball(200, COLOURS[0]), { name: 'ball.splat' });
+  const frames = Array.from({ length: count }, (_, k) => {
+    const frame = begin + k;
+    const color = COLOURS[frame % 3].map((value) => (value / 255 - 0.5) / 0.28209479177387814);
+    const positions = first.positions.map((value, i) => value + (i % 3 === 0 ? 0.02 * frame : 0));
+    return { ...first, positions, sh: first.sh.map((_, i) => color[i % 3]) };
+  });
+  const deflate = (bytes) => deflateRawSync(bytes, { finishFlush: constants.Z_SYNC_FLUSH });
+  const steps = { position: 1e-3, rotation: 1e-2, scale: 1e-2, opacity: 1e-2, color: 1e-2 };
+  return writeMotion(first, frames, { steps, deflate });
 }
 
 /** A PLY's header, and rows that it repeats. */

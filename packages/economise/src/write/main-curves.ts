@@ -1,0 +1,76 @@
+/** Rows that curves are found from, at most: more say hardly anything else. */
+const MOST_ROWS = 30_000;
+const MOST_SWEEPS = 30;
+
+/**
+ * The curves that rows follow most, each of root mean square 1 and across all others (their principal components, about 0), the most followed first.
+ * @param rows [N, length]
+ * @param least root mean square of what rows follow of a curve, as a rule, below which it is left out
+ */
+export function mainCurves(rows: Float32Array, length: number, least: number): Float64Array[] {
+  const count = rows.length / length;
+  const stride = Math.max(1, Math.floor(count / MOST_ROWS));
+  const products = new Float64Array(length * length);
+  let used = 0;
+  for (let row = 0; row < count; row += stride, used++) {
+    const own = rows.subarray(length * row, length * (row + 1));
+    for (let a = 0; a < length; a++) {
+      if (own[a] === 0) continue;
+      for (let b = a; b < length; b++) products[length * a + b] += own[a] * own[b];
+    }
+  }
+  for (let a = 0; a < length; a++) {
+    for (let b = a; b < length; b++) products[length * b + a] = products[length * a + b] /= used;
+  }
+  const { values, vectors } = eigen(products, length);
+  return values
+    .map((value, k) => ({ value, curve: vectors[k] }))
+    .sort((a, b) => b.value - a.value)
+    .filter(({ value }) => value > least * least * length)
+    .map(({ curve }) => curve.map((part) => part * Math.sqrt(length)));
+}
+
+/** Eigenvalues and eigenvectors of a symmetric matrix, by Jacobi's rotations. The matrix is used up. */
+function eigen(matrix: Float64Array, size: number): { values: number[]; vectors: Float64Array[] } {
+  const vectors = Array.from({ length: size }, (_, k) =>
+    Float64Array.from({ length: size }, (_, i) => (i === k ? 1 : 0)),
+  );
+  const trace = Array.from({ length: size }, (_, k) => matrix[(size + 1) * k]).reduce((sum, value) => sum + value, 0);
+  for (let sweep = 0; sweep < MOST_SWEEPS; sweep++) {
+    let rest = 0;
+    for (let p = 0; p < size; p++) {
+      for (let q = p + 1; q < size; q++) {
+        const between = matrix[size * p + q];
+        rest += between * between;
+        if (Math.abs(between) <= 1e-15 * trace) continue;
+        const theta = (matrix[(size + 1) * q] - matrix[(size + 1) * p]) / (2 * between);
+        const t = (theta < 0 ? -1 : 1) / (Math.abs(theta) + Math.hypot(theta, 1));
+        const c = 1 / Math.hypot(t, 1);
+        turn(matrix, vectors, size, { p, q, c, s: t * c });
+      }
+    }
+    if (Math.sqrt(rest) <= 1e-10 * trace) break;
+  }
+  return { values: vectors.map((_, k) => matrix[(size + 1) * k]), vectors };
+}
+
+function turn(
+  matrix: Float64Array,
+  vectors: readonly Float64Array[],
+  size: number,
+  { p, q, c, s }: { p: number; q: number; c: number; s: number },
+): void {
+  for (let k = 0; k < size; k++) {
+    const [a, b] = [matrix[size * k + p], matrix[size * k + q]];
+    matrix[size * k + p] = c * a - s * b;
+    matrix[size * k + q] = s * a + c * b;
+  }
+  for (let k = 0; k < size; k++) {
+    const [a, b] = [matrix[size * p + k], matrix[size * q + k]];
+    matrix[size * p + k] = c * a - s * b;
+    matrix[size * q + k] = s * a + c * b;
+    const [x, y] = [vectors[p][k], vectors[q][k]];
+    vectors[p][k] = c * x - s * y;
+    vectors[q][k] = s * x + c * y;
+  }
+}

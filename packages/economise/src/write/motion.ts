@@ -1,0 +1,194 @@
+import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { MOTION_MODES, MOTION_VERSION, MOVING, MOVING_NAMES, type MovingName } from '@gaussian-splat/formats';
+import type { Steps } from '../allocate-steps.js';
+import { mainCurves } from './main-curves.js';
+
+/** What is rounded: `position` in world units, `rotation` in radians, `scale` in natural logarithms, `opacity` and `color` (the constant coefficient) in their own. */
+export type MotionSteps = Steps<MovingName>;
+
+export interface MotionOptions {
+  readonly steps: MotionSteps;
+  /** What compresses bytes to a piece of a raw deflate stream that others are put behind. */
+  readonly deflate: (bytes: Uint8Array) => Uint8Array;
+}
+
+/** Codes below this share of a step are 0: zeros cost hardly a bit. */
+const DEAD_ZONE = 0.6;
+/** Curves that splats follow by less than this share of a step, as a rule, are left out. */
+const LEAST_CURVE = 0.12;
+const MOST_CODE = 32_767;
+/** An empty last block of a deflate stream. */
+const END = Uint8Array.of(3, 0);
+
+interface WrittenPart {
+  readonly rank: number;
+  readonly step: number;
+  readonly curves: Float32Array;
+  readonly codes: readonly Int16Array[];
+}
+
+/**
+ * Writes a file of motion: what frames differ by from the first frame of their sequence, whose splats correspond to theirs, one by one.
+ * Of each attribute the curves are found that its numbers follow most, over the frames of the file; of each splat it is written how much it follows each.
+ * @param first as it is read from its file
+ * @param frames whose axes have the names that those of the first have: see `withNearAxes`
+ * @throws GaussianSplatError `argument/value` for frames of other splats
+ */
+export function writeMotion(
+  first: GaussianCloud,
+  frames: readonly GaussianCloud[],
+  { steps, deflate }: MotionOptions,
+): Uint8Array<ArrayBuffer> {
+  const other = frames.find(({ count }) => count !== first.count);
+  if (other) throw notCorresponding(first.count, other.count);
+  const parts = MOVING_NAMES.map((name) =>
+    partOf(changesOf(first, frames, name), first.count, frames.length, steps[name]),
+  );
+  const head = new DataView(new ArrayBuffer(12 + 8 * parts.length));
+  [MOTION_VERSION, first.count, frames.length].forEach((number, k) => head.setUint32(4 * k, number, true));
+  parts.forEach(({ rank, step }, k) => {
+    head.setUint32(12 + 8 * k, rank, true);
+    head.setFloat32(16 + 8 * k, step, true);
+  });
+  const curves = new DataView(new ArrayBuffer(4 * parts.reduce((sum, part) => sum + part.curves.length, 0)));
+  parts.flatMap((part) => [...part.curves]).forEach((value, k) => curves.setFloat32(4 * k, value, true));
+  const planes = parts.flatMap(({ codes }) => codes.map((own) => smaller(own, deflate)));
+  const modes = Uint8Array.from(planes, ({ mode }) => mode);
+  const begin = joined([bytesOf(head), bytesOf(curves), modes]);
+  return joined([deflate(begin), ...planes.map(({ bytes }) => bytes), END]);
+}
+
+/** [width · splats, frames] what each number differs by from the first frame; undefined where all are as they were. */
+function changesOf(first: GaussianCloud, frames: readonly GaussianCloud[], name: MovingName): Float32Array | undefined {
+  const { count } = first;
+  const changes = new Float32Array(MOVING[name] * count * frames.length);
+  let hasChanged = false;
+  const put = (number: number, i: number, frame: number, value: number): void => {
+    changes[(number * count + i) * frames.length + frame] = value;
+    if (value !== 0) hasChanged = true;
+  };
+  if (name === 'rotation') putTurns(first, frames, put);
+  else {
+    const of = numbersOf(name, first);
+    frames.forEach((cloud, frame) => {
+      for (let i = 0; i < count; i++) {
+        for (let number = 0; number < MOVING[name]; number++)
+          put(number, i, frame, of(cloud, i, number) - of(first, i, number));
+      }
+    });
+  }
+  return hasChanged ? changes : undefined;
+}
+
+function numbersOf(
+  name: Exclude<MovingName, 'rotation'>,
+  { shDegree, origin }: GaussianCloud,
+): (cloud: GaussianCloud, i: number, number: number) => number {
+  const stride = 3 * shCoefficientCount(shDegree);
+  const least = 1e-12;
+  return {
+    position: (cloud: GaussianCloud, i: number, k: number) =>
+      cloud.positions[3 * i + k] + (cloud.origin[k] - origin[k]),
+    scale: ({ scales }: GaussianCloud, i: number, k: number) => Math.log(Math.max(least, scales[3 * i + k])),
+    opacity: ({ opacities }: GaussianCloud, i: number) => opacities[i],
+    color: ({ sh }: GaussianCloud, i: number, k: number) => sh[stride * i + k],
+  }[name];
+}
+
+/** Axes as long as the angles, each the nearest to that of the frame before. */
+function putTurns(
+  first: GaussianCloud,
+  frames: readonly GaussianCloud[],
+  put: (number: number, i: number, frame: number, value: number) => void,
+): void {
+  const turn = new Float64Array(4);
+  for (let i = 0; i < first.count; i++) {
+    const last = [1, 0, 0, 0];
+    frames.forEach(({ rotations }, frame) => {
+      turnBetween(first.rotations, rotations, 4 * i, turn);
+      if (last.reduce((sum, value, k) => sum + value * turn[k], 0) < 0) for (let k = 0; k < 4; k++) turn[k] = -turn[k];
+      for (let k = 0; k < 4; k++) last[k] = turn[k];
+      const [w, x, y, z] = turn;
+      const length = Math.hypot(x, y, z);
+      const factor = length > 1e-12 ? (2 * Math.atan2(length, w)) / length : 2;
+      put(0, i, frame, factor * x);
+      put(1, i, frame, factor * y);
+      put(2, i, frame, factor * z);
+    });
+  }
+}
+
+/** The quaternion that leads from one rotation to another. */
+function turnBetween(from: Float32Array, to: Float32Array, at: number, turn: Float64Array): void {
+  const [w, x, y, z] = [from[at], -from[at + 1], -from[at + 2], -from[at + 3]];
+  const [a, b, c, d] = [to[at], to[at + 1], to[at + 2], to[at + 3]];
+  turn[0] = a * w - b * x - c * y - d * z;
+  turn[1] = a * x + b * w + c * z - d * y;
+  turn[2] = a * y - b * z + c * w + d * x;
+  turn[3] = a * z + b * y - c * x + d * w;
+}
+
+const UNCHANGED: WrittenPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
+
+/** Curves of an attribute, and how much of each the numbers of splats follow. */
+function partOf(changes: Float32Array | undefined, splats: number, frames: number, asked: number): WrittenPart {
+  if (changes === undefined) return UNCHANGED;
+  const rows = changes.length / frames;
+  const found = mainCurves(changes, frames, LEAST_CURVE * asked);
+  const follows = (row: number, curve: Float64Array): number => {
+    let sum = 0;
+    for (let f = 0; f < frames; f++) sum += changes[frames * row + f] * curve[f];
+    return sum / frames;
+  };
+  const shares = found.map((curve) => Float32Array.from({ length: rows }, (_, row) => follows(row, curve)));
+  const most = shares.reduce((all, own) => own.reduce((largest, value) => Math.max(largest, Math.abs(value)), all), 0);
+  const step = Math.fround(Math.max(asked, most / MOST_CODE));
+  const codes = shares.map((own) =>
+    Int16Array.from(own, (value) => (Math.abs(value) < DEAD_ZONE * step ? 0 : Math.round(value / step))),
+  );
+  const kept = codes.map((own, k) => ({ own, k })).filter(({ own }) => own.some((code) => code !== 0));
+  const rank = kept.length;
+  const curves = new Float32Array(frames * rank);
+  kept.forEach(({ k }, at) => found[k].forEach((value, f) => (curves[rank * f + at] = value)));
+  const width = rows / splats;
+  const ofNumber = (number: number): Int16Array[] =>
+    kept.map(({ own }) => own.subarray(splats * number, splats * (number + 1)));
+  return { rank, step, curves, codes: Array.from({ length: width }, (_, number) => ofNumber(number)).flat() };
+}
+
+/** Codes as two planes of bytes, whichever way is smaller. */
+function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: number; bytes: Uint8Array } {
+  const differences = codes.map((code, i) => code - (i > 0 ? codes[i - 1] : 0));
+  const [plain, changed] = [codes, differences].map((own) => {
+    const planes = new Uint8Array(2 * own.length);
+    own.forEach((code, i) => {
+      const folded = (code << 1) ^ (code >> 15);
+      planes[i] = folded & 255;
+      planes[own.length + i] = (folded >> 8) & 255;
+    });
+    return joined([deflate(planes.subarray(0, own.length)), deflate(planes.subarray(own.length))]);
+  });
+  return plain.length <= changed.length
+    ? { mode: MOTION_MODES.plain, bytes: plain }
+    : { mode: MOTION_MODES.differences, bytes: changed };
+}
+
+const bytesOf = ({ buffer }: DataView): Uint8Array => new Uint8Array(buffer);
+
+function joined(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
+  const all = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    all.set(piece, at);
+    at += piece.length;
+  }
+  return all;
+}
+
+const notCorresponding = (expected: number, found: number): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'frames of a sequence',
+    expected: `${expected} splats in each, the same ones in the same order`,
+    found: `one of ${found}`,
+    remedy: 'keep scene files for such frames: {"gaussianSplatSequence": 1, ...}',
+  });

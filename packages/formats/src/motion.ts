@@ -1,0 +1,244 @@
+import { type GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { type LoadBudget } from './budget.js';
+import { GrowingBytes, grouped, viewOf } from './bytes.js';
+import { checkedPart } from './checked-part.js';
+import { damaged } from './damaged.js';
+import { noSplats } from './no-splats.js';
+
+/** What may change from frame to frame, in the order of files, and how many numbers of a splat it is. */
+export const MOVING = { position: 3, rotation: 3, scale: 3, opacity: 1, color: 3 } as const;
+export type MovingName = keyof typeof MOVING;
+export const MOVING_NAMES = Object.keys(MOVING) as readonly MovingName[];
+
+export const MOTION_VERSION = 1;
+/** Version, splats, frames; a rank and a step for each of {@link MOVING}. */
+const HEAD_BYTES = 4 * (3 + 2 * MOVING_NAMES.length);
+/** Compressed bytes handed over at once, see Gunzip. */
+const FEED_BYTES = 16_384;
+/** How codes are written: as they are, or by what each adds to the one before. */
+export const MOTION_MODES = { plain: 0, differences: 1 } as const;
+/** Curves are of length 1 a frame, or about. */
+const MOST_CURVE = 1e6;
+
+/** How one attribute changes: at frame f by step · Σ_k curves[f, k] · codes[number, k]. */
+export interface MovingPart {
+  /** Curves that all splats share; 0: the attribute does not change. */
+  readonly rank: number;
+  readonly step: number;
+  /** [frames, rank] */
+  readonly curves: Float32Array;
+  /** [width, rank] of [splats]: how much of a curve a number of each splat follows. */
+  readonly codes: readonly Int16Array[];
+}
+
+/** What some frames of a sequence differ by from the first. */
+export interface Motion {
+  readonly splats: number;
+  readonly frames: number;
+  readonly parts: Readonly<Record<MovingName, MovingPart>>;
+}
+
+/** What a file must fit: splats of the first frame, and frames that the manifest gives it. */
+export interface MotionFile {
+  readonly bytes: Uint8Array;
+  readonly name: string;
+  readonly splats: number;
+  readonly frames: number;
+  readonly budget: LoadBudget;
+}
+
+/**
+ * Reads a file of motion: docs/sequences.md describes it.
+ * @throws GaussianSplatError `decode/corrupt`, `decode/truncated`, `decode/unsupported`, `decode/header`, `decode/html`, `decode/lfs-pointer`, or `out-of-memory/budget`
+ */
+export async function readMotion({ bytes, name, ...asked }: MotionFile): Promise<Motion> {
+  return new MotionReader(await inflate(await checkedPart(bytes, name), name, asked), name, asked).read();
+}
+
+type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget'>;
+
+/** Inflates a file, of whose head all else follows: no more than that is held. */
+async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<Uint8Array> {
+  const { readable, writable } = new DecompressionStream('deflate-raw');
+  const reader = readable.getReader();
+  // Errors of the stream come through the reader.
+  feed(writable.getWriter(), bytes).catch(() => {});
+  const output = new GrowingBytes(65_536);
+  let length: number | undefined;
+  try {
+    for (;;) {
+      const { value } = await reader.read().catch((cause: unknown) => {
+        throw damaged(name, 'an intact deflate stream', 'a damaged one', 'decode/corrupt', cause);
+      });
+      if (value === undefined) break;
+      output.append(value);
+      if (length === undefined && output.length >= HEAD_BYTES) {
+        length = lengthFrom(output.view(), name, asked);
+        // What grows is there twice while it is copied.
+        asked.budget.take(2 * length, name);
+      }
+      if (length !== undefined && output.length > length) throw wrongLength(name, length, 'more');
+    }
+  } finally {
+    reader.cancel().catch(() => {});
+  }
+  if (output.length === length) return output.view();
+  throw wrongLength(name, length ?? HEAD_BYTES, grouped(output.length));
+}
+
+async function feed(writer: WritableStreamDefaultWriter<BufferSource>, bytes: Uint8Array): Promise<void> {
+  for (let at = 0; at < bytes.length; at += FEED_BYTES) await writer.write(bytes.slice(at, at + FEED_BYTES));
+  await writer.close();
+}
+
+const wrongLength = (name: string, expected: number, found: string): GaussianSplatError =>
+  damaged(name, `${grouped(expected)} bytes, inflated`, found, 'decode/truncated');
+
+const rankAt = (view: DataView, k: number): number => view.getUint32(12 + 8 * k, true);
+
+/** Bytes that a file inflates to, by its head. */
+function lengthFrom(head: Uint8Array, name: string, { splats, frames }: Asked): number {
+  const view = viewOf(head);
+  const [version, ownSplats, ownFrames] = [0, 4, 8].map((at) => view.getUint32(at, true));
+  if (version !== MOTION_VERSION)
+    throw damaged(name, `motion of version ${MOTION_VERSION}`, `version ${version}`, 'decode/unsupported');
+  if (ownSplats !== splats || ownFrames !== frames) {
+    throw damaged(
+      name,
+      `${grouped(frames)} frames of the ${grouped(splats)} splats of the first one`,
+      `${grouped(ownFrames)} of ${grouped(ownSplats)}`,
+      'decode/header',
+    );
+  }
+  return MOVING_NAMES.reduce((sum, part, k) => {
+    const rank = rankAt(view, k);
+    if (rank > frames) throw damaged(name, `at most ${frames} curves`, `${rank} for ${part}`, 'decode/header');
+    return sum + 4 * frames * rank + MOVING[part] * rank * (1 + 2 * splats);
+  }, HEAD_BYTES);
+}
+
+class MotionReader {
+  readonly #bytes: Uint8Array;
+  readonly #name: string;
+  readonly #asked: Asked;
+  #at = HEAD_BYTES;
+
+  constructor(bytes: Uint8Array, name: string, asked: Asked) {
+    this.#bytes = bytes;
+    this.#name = name;
+    this.#asked = asked;
+  }
+
+  read(): Motion {
+    const { splats, frames, budget } = this.#asked;
+    const view = viewOf(this.#bytes);
+    const curves = MOVING_NAMES.map((_, k) => this.#curves(view, frames * rankAt(view, k)));
+    const modes = this.#take(MOVING_NAMES.reduce((sum, part, k) => sum + MOVING[part] * rankAt(view, k), 0));
+    budget.take(2 * splats * modes.length, this.#name);
+    let plane = 0;
+    const parts = MOVING_NAMES.map((part, k): [MovingName, MovingPart] => {
+      const rank = rankAt(view, k);
+      const step = view.getFloat32(16 + 8 * k, true);
+      if (rank > 0 && !(step > 0 && step < Infinity)) throw damaged(this.#name, 'steps above 0', `${step} for ${part}`);
+      const codes = Array.from({ length: MOVING[part] * rank }, () => this.#codes(modes[plane++]));
+      return [part, { rank, step, curves: curves[k], codes }];
+    });
+    return { splats, frames, parts: Object.fromEntries(parts) as Motion['parts'] };
+  }
+
+  #take(count: number): Uint8Array {
+    return this.#bytes.subarray(this.#at, (this.#at += count));
+  }
+
+  #curves(view: DataView, count: number): Float32Array {
+    const found = Float32Array.from({ length: count }, (_, i) => view.getFloat32(this.#at + 4 * i, true));
+    this.#at += 4 * count;
+    if (found.every((value) => Math.abs(value) <= MOST_CURVE)) return found;
+    throw damaged(this.#name, 'curves of finite numbers', 'others');
+  }
+
+  #codes(mode: number): Int16Array {
+    const { splats } = this.#asked;
+    const [low, high] = [this.#take(splats), this.#take(splats)];
+    const codes = new Int16Array(splats);
+    let last = 0;
+    for (let i = 0; i < splats; i++) {
+      const code = low[i] | (high[i] << 8);
+      const value = (code >>> 1) ^ -(code & 1);
+      last = mode === MOTION_MODES.differences ? ((last + value) << 16) >> 16 : value;
+      codes[i] = last;
+    }
+    return codes;
+  }
+}
+
+/**
+ * The splats of a frame. The first frame is left as it is.
+ * @param frame 0 is the first that the motion is of
+ * @param budget is charged for them
+ * @throws GaussianSplatError `decode/empty` if none of them can be drawn, `out-of-memory/budget`
+ */
+export function movedCloud(
+  first: GaussianCloud,
+  { parts }: Motion,
+  frame: number,
+  name: string,
+  budget: LoadBudget,
+): GaussianCloud {
+  budget.takeSplats(first.count, first.shDegree, name);
+  const cloud = {
+    ...first,
+    positions: first.positions.slice(),
+    scales: first.scales.slice(),
+    rotations: first.rotations.slice(),
+    opacities: first.opacities.slice(),
+    sh: first.sh.slice(),
+  };
+  const change = new Float32Array(first.count);
+  const eachNumber = (part: MovingName, put: (number: number) => void): void => {
+    const { rank, step, curves, codes } = parts[part];
+    if (rank === 0) return;
+    for (let number = 0; number < MOVING[part]; number++) {
+      change.fill(0);
+      for (let k = 0; k < rank; k++) {
+        const factor = step * curves[rank * frame + k];
+        const own = codes[rank * number + k];
+        for (let i = 0; i < own.length; i++) change[i] += factor * own[i];
+      }
+      put(number);
+    }
+  };
+  const add = (values: Float32Array, stride: number) => (number: number) => {
+    for (let i = 0; i < change.length; i++) values[stride * i + number] += change[i];
+  };
+  eachNumber('position', add(cloud.positions, 3));
+  eachNumber('scale', (number) => {
+    for (let i = 0; i < change.length; i++) cloud.scales[3 * i + number] *= Math.exp(change[i]);
+  });
+  eachNumber('opacity', add(cloud.opacities, 1));
+  eachNumber('color', add(cloud.sh, 3 * shCoefficientCount(first.shDegree)));
+  if (parts.rotation.rank > 0) {
+    const turns = new Float32Array(3 * first.count);
+    eachNumber('rotation', add(turns, 3));
+    turnBy(cloud.rotations, turns);
+  }
+  const usable = keepUsable(cloud);
+  if (usable.count > 0) return usable;
+  throw noSplats(name, usable.droppedCount);
+}
+
+/** Turns quaternions further, about axes as long as the angles. */
+function turnBy(rotations: Float32Array, turns: Float32Array): void {
+  for (let i = 0; i < turns.length / 3; i++) {
+    const [x, y, z] = [turns[3 * i], turns[3 * i + 1], turns[3 * i + 2]];
+    const angle = Math.hypot(x, y, z);
+    const [c, s] = [Math.cos(angle / 2), angle > 0 ? Math.sin(angle / 2) / angle : 0.5];
+    const [p, q, r] = [s * x, s * y, s * z];
+    const at = 4 * i;
+    const [w, a, b, d] = [rotations[at], rotations[at + 1], rotations[at + 2], rotations[at + 3]];
+    rotations[at] = c * w - p * a - q * b - r * d;
+    rotations[at + 1] = c * a + p * w + q * d - r * b;
+    rotations[at + 2] = c * b - p * d + q * w + r * a;
+    rotations[at + 3] = c * d + p * b - q * a + r * w;
+  }
+}
