@@ -35,7 +35,7 @@ export class GlPainter implements Painter {
   #tellShown: () => void = () => undefined;
   /** What a whole frame takes, as far as is known, ms. */
   #wholeMs = 0;
-  #rendering: Rendering = { quality: 'default', shDegree: 3 };
+  #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
   #isDestroyed = false;
 
   constructor(scene: GlLoaded, events: PainterEvents) {
