@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import {
   CapacityMonitor,
+  CountBuffers,
   LEAST_CAPACITY,
   CapacityMemory,
   type Capacity,
@@ -16,7 +17,7 @@ function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonito
   const device = { createBuffer: () => ({ destroy: () => undefined }) } as unknown as GPUDevice;
   let current = room;
   const monitor = new CapacityMonitor(
-    device,
+    new CountBuffers(device),
     room,
     { least, most: MOST },
     new CapacityMemory(),

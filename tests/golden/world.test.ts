@@ -391,11 +391,14 @@ test('memory follows what comes: ten scenes, one of them added, moved, hidden, r
       assert.deepEqual([buffersCreated, bytesAllocated, submits], [0, 0, 1], 'moving allocates nothing');
     }
     const expected = await capture(device, viewpoint, { camera });
-    last.visible = false;
-    await capture(device, viewpoint, { camera });
     world.remove(placements[0]);
     placements[0] = world.add({ scene: scenes[0] });
+    assert.equal(draw().buffersCreated, 0, 'another order allocates nothing');
+    last.visible = false;
+    assert.equal(draw().buffersCreated, 0, 'a scene that is hidden allocates nothing');
+    await capture(device, viewpoint, { camera });
     last.visible = true;
+    assert.equal(draw().buffersCreated, 0, 'a scene that comes back finds the room that it left');
     const again = await capture(device, viewpoint, { camera });
     assert.ok(psnr(again, expected) > 90, 'what came back looks as before');
     for (const placement of placements) world.remove(placement);

@@ -1,5 +1,3 @@
-import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory } from './gpu/memory.js';
 import type { GeometryReading } from './geometry-reading.js';
 import type { Wishes } from './gaussian-scene.js';
 import type { PageTable } from './page-table.js';
@@ -73,34 +71,24 @@ export class FrameBindings {
   readonly table: PageTable;
   readonly scratch: Scratch;
   readonly #stages: Stages;
-  readonly #memory: GpuMemory;
 
-  constructor(device: GPUDevice, stages: Stages, { table, scratch }: FrameBuffers) {
+  constructor(stages: Stages, { table, scratch }: FrameBuffers) {
     this.#stages = stages;
     this.table = table;
     this.scratch = scratch;
-    const memory = (this.#memory = new GpuMemory(device));
     this.pages = bindPages(stages, table, scratch);
-    const { groupOffsets, plan } = scratch;
-    const count = table.pages.length;
-    const { storage, uniform } = BUFFER_USAGE;
-    const { firstGroups, groups } = table;
-    const ranges = table.pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]);
     this.detailAllow = stages.detailBudget.bindAllow({
       view: table.view(0),
       detail_counts: scratch.detailCounts,
       chunk_shares: scratch.chunkShares,
     });
+    scratch.lay(table);
     this.plan = stages.plan.bind({
-      limits: memory.buffer('gs.plan.limits', 16, uniform, Uint32Array.of(count, scratch.capacity, groups)),
-      values: groupOffsets,
-      page_ranges: memory.buffer('gs.plan.page_groups', 8 * Math.max(1, count), storage, Uint32Array.from(ranges)),
-      plan,
+      limits: scratch.limits,
+      values: scratch.groupOffsets,
+      page_ranges: scratch.pageRanges,
+      plan: scratch.plan,
     });
-  }
-
-  get byteLength(): number {
-    return this.#memory.byteLength;
   }
 
   /** What sorting by keys of so many bits needs. */
@@ -111,10 +99,6 @@ export class FrameBindings {
     const made = this.#stages.sort.bind({ plan, keys, values: order, digitCounts, digitTotals }, keyBits);
     this.#sorts.set(keyBits, made);
     return made;
-  }
-
-  destroy(): void {
-    this.#memory.destroy();
   }
 }
 

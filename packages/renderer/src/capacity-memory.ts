@@ -81,6 +81,13 @@ export class CapacityMemory {
     };
   }
 
+  /** What the last picture that was looked at needs when it is whole, with so many times as much room; undefined where none was looked at. */
+  needed(headroom: number): Capacity | undefined {
+    if (this.#last === undefined) return undefined;
+    const { visible, pairs } = this.wholeNeedBy(this.#last);
+    return { visible: Math.ceil(headroom * visible), pairs: Math.ceil(headroom * pairs) };
+  }
+
   /** What the last whole picture needed, if that had so many pixels. */
   wholeNeed(pixels: number): Capacity {
     return pixels === this.#whole.pixels ? this.#whole.need : NOTHING;

@@ -16,7 +16,7 @@ export const LEAST_CAPACITY: Capacity = { visible: 1, pairs: LEAST_PAIRS };
 /** Room for pairs that small scenes get without asking, so that a first frame from near by has it: 32 MB. */
 const GENEROUS_PAIRS = 1 << 21;
 /** More room than was needed. */
-const HEADROOM = 1.25;
+export const HEADROOM = 1.25;
 /** Share of the room that must be in use before there is more, or less. */
 const FULL = 0.92;
 const SLACK = 0.7;
@@ -42,11 +42,43 @@ export function initialCapacity(splats: number, most: Capacity, isBudgeted = fal
   return { visible, pairs: Math.min(most.pairs, pairs) };
 }
 
+/** Buffers that counts are read from: one for the monitor at hand and one for the next, so that none is made when scenes come and go. */
+export class CountBuffers {
+  readonly #device: GPUDevice;
+  readonly #free: GPUBuffer[];
+  #isDestroyed = false;
+
+  constructor(device: GPUDevice) {
+    this.#device = device;
+    this.#free = [this.#make(), this.#make()];
+  }
+
+  take(): GPUBuffer {
+    return this.#free.pop() ?? this.#make();
+  }
+
+  give(buffer: GPUBuffer): void {
+    if (this.#isDestroyed) buffer.destroy();
+    else this.#free.push(buffer);
+  }
+
+  destroy(): void {
+    this.#isDestroyed = true;
+    for (const buffer of this.#free) buffer.destroy();
+  }
+
+  #make(): GPUBuffer {
+    const { mapRead, copyDestination } = BUFFER_USAGE;
+    return this.#device.createBuffer({ label: 'gs.capacity', size: 16, usage: mapRead | copyDestination });
+  }
+}
+
 /**
  * Watches how full the buffers are and says when they should be larger or smaller. Counts come back from the GPU a frame or more
  * later, and nothing waits for them; where there is room for everything that can happen, nothing is read at all.
  */
 export class CapacityMonitor {
+  readonly #buffers: CountBuffers;
   readonly #staging: GPUBuffer;
   readonly #bounds: CapacityBounds;
   readonly #onWish: (capacity: Capacity, overflowed: boolean) => void;
@@ -63,11 +95,12 @@ export class CapacityMonitor {
   #recent: Capacity = { visible: 0, pairs: 0 };
 
   /**
+   * @param buffers what its counts are read from
    * @param memory what monitors before this one have learnt about the scene
    * @param onWish called with the room that the next frame should have
    */
   constructor(
-    device: GPUDevice,
+    buffers: CountBuffers,
     capacity: Capacity,
     bounds: CapacityBounds,
     memory: CapacityMemory,
@@ -77,8 +110,8 @@ export class CapacityMonitor {
     this.#capacity = capacity;
     this.#bounds = bounds;
     this.#onWish = onWish;
-    const { mapRead, copyDestination } = BUFFER_USAGE;
-    this.#staging = device.createBuffer({ label: 'gs.capacity', size: 16, usage: mapRead | copyDestination });
+    this.#buffers = buffers;
+    this.#staging = buffers.take();
   }
 
   /**
@@ -114,10 +147,13 @@ export class CapacityMonitor {
   read(): Promise<Capacity | undefined> {
     return this.#staging.mapAsync(0x1).then(
       () => {
-        if (this.#isDestroyed) return undefined;
         const [visible, hidden, pairs, lostPairs] = new Uint32Array(this.#staging.getMappedRange().slice(0));
         this.#staging.unmap();
         this.#isReading = false;
+        if (this.#isDestroyed) {
+          this.#buffers.give(this.#staging);
+          return undefined;
+        }
         const used = { visible: visible + hidden, pairs: pairs + lostPairs };
         this.judge(used, hidden + lostPairs > 0, this.#picture);
         return { visible, pairs };
@@ -128,7 +164,7 @@ export class CapacityMonitor {
 
   destroy(): void {
     this.#isDestroyed = true;
-    this.#staging.destroy();
+    if (!this.#isReading) this.#buffers.give(this.#staging);
   }
 
   /**

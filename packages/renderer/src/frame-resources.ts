@@ -1,6 +1,6 @@
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityMemory, type Capacity } from './capacity-memory.js';
-import { CapacityMonitor, initialCapacity, LEAST_CAPACITY } from './capacity.js';
+import { CapacityMonitor, CountBuffers, HEADROOM, initialCapacity, LEAST_CAPACITY } from './capacity.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
@@ -36,6 +36,7 @@ export class FrameResources {
   readonly #device: GPUDevice;
   readonly #options: ResourceOptions;
   #current: Resources | undefined;
+  #counts: CountBuffers | undefined;
   #capacity: Capacity | undefined;
   #memory = new CapacityMemory();
   #hasOtherPairs = false;
@@ -61,8 +62,8 @@ export class FrameResources {
   }
 
   get byteLength(): number {
-    const { table, scratch, bindings } = this.#current ?? {};
-    return [table, scratch, bindings].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const { table, scratch } = this.#current ?? {};
+    return [table, scratch].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
   /**
@@ -92,7 +93,7 @@ export class FrameResources {
     const added = table.splats - before;
     const visible =
       added > 0
-        ? Math.min(most.visible, now.visible + initialCapacity(added, most, this.#isBudgeted(table)).visible)
+        ? this.#visibleWith(initialCapacity(added, most, this.#isBudgeted(table)).visible, most)
         : Math.min(now.visible, first.visible);
     const pairs = added > 0 ? Math.max(now.pairs, first.pairs) : Math.min(now.pairs, first.pairs);
     const isEnough = (own: number, wanted: number): boolean => wanted <= own && wanted >= own * LEAST_USED;
@@ -105,13 +106,22 @@ export class FrameResources {
     return this.#rebind(table);
   }
 
+  /** Visible splats to have room for once so many may come. What stood empty before is room, too. */
+  #visibleWith(coming: number, most: Capacity): number {
+    const { visible } = this.#capacity!;
+    const needed = this.#memory.needed(HEADROOM);
+    if (needed !== undefined && needed.visible + coming <= visible) return visible;
+    return Math.min(most.visible, visible + coming);
+  }
+
   /** Frees everything. */
   release(): void {
-    const { table, scratch, bindings, monitor } = this.#current ?? {};
+    const { table, scratch, monitor } = this.#current ?? {};
     table?.destroy();
     scratch?.destroy();
-    bindings?.destroy();
     monitor?.destroy();
+    this.#counts?.destroy();
+    this.#counts = undefined;
     this.#current = undefined;
     this.#boundPlan = undefined;
   }
@@ -154,8 +164,6 @@ export class FrameResources {
     const capacity = this.#capacity!;
     const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
     if (kept === undefined) this.#current?.scratch.destroy();
-    this.#current?.bindings.destroy();
-    this.#current?.monitor.destroy();
     if (table.hasDetail) stages.detailBudget.prepare();
     const pages = table.pages.length;
     const { visible, pairs } = capacity;
@@ -167,7 +175,7 @@ export class FrameResources {
     if (!isSame || this.#hasOtherPairs) this.#bindRasterizer(scratch, capacity);
     this.#boundPlan = scratch.plan;
     this.#hasOtherPairs = false;
-    const bindings = new FrameBindings(this.#device, stages, { table, scratch });
+    const bindings = new FrameBindings(stages, { table, scratch });
     const monitor = this.#watch(table, capacity);
     this.#current = { table, scratch, bindings, monitor };
     return this.#current;
@@ -186,7 +194,9 @@ export class FrameResources {
 
   #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
     const bounds = { least: () => this.#leastFor(table), most: this.#mostFor(table) };
-    return new CapacityMonitor(this.#device, capacity, bounds, this.#memory, (wished, overflowed) => {
+    this.#current?.monitor.destroy();
+    this.#counts ??= new CountBuffers(this.#device);
+    return new CapacityMonitor(this.#counts, capacity, bounds, this.#memory, (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
       if (overflowed) this.#options.onIncomplete();

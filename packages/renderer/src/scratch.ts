@@ -1,6 +1,7 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import type { PageTable } from './page-table.js';
 import { scanBytes } from './stages/plan.js';
 
 /** How much the buffers between the stages must hold. */
@@ -30,6 +31,10 @@ export class Scratch {
   /** See shaders/shared/gathered.wgsl. */
   readonly gathered: GPUBuffer;
   plan: GPUBuffer;
+  /** First group of each page and of the next one, [page][2]. */
+  pageRanges: GPUBuffer;
+  /** PlanLimits of plan.wgsl. */
+  readonly limits: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Depth keys. */
@@ -40,14 +45,16 @@ export class Scratch {
   /** [block][digit] */
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
+  readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
   readonly #kept = new Map<string, GPUBuffer>();
 
   /** @param spareBytes least size of {@link spare} */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
     const memory = new GpuMemory(device);
+    this.#device = device;
     this.#memory = memory;
-    const { storage, copyDestination, copySource } = BUFFER_USAGE;
+    const { storage, uniform, copyDestination, copySource } = BUFFER_USAGE;
     this.capacity = visible;
     const buffer = (name: string, bytes: number): GPUBuffer =>
       memory.buffer(`gs.${name}`, bytes, storage | copySource | copyDestination);
@@ -60,6 +67,8 @@ export class Scratch {
       this.groupOffsets = buffer('cull.group_offsets', sizes.groupOffsets);
       this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);
       this.plan = buffer('plan.plan', sizes.plan);
+      this.pageRanges = buffer('plan.page_ranges', sizes.pageRanges);
+      this.limits = memory.buffer('gs.plan.limits', 16, uniform | copyDestination);
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.#keys = perSplat('sort.keys');
       this.#order = perSplat('sort.order');
@@ -103,6 +112,14 @@ export class Scratch {
     this.visibleBits = grown(this.visibleBits, sizes.visibleBits);
     this.groupOffsets = grown(this.groupOffsets, sizes.groupOffsets);
     this.plan = grown(this.plan, sizes.plan);
+    this.pageRanges = grown(this.pageRanges, sizes.pageRanges);
+  }
+
+  /** Tells the stages which groups belong to which page. */
+  lay({ pages, firstGroups, groups }: Pick<PageTable, 'pages' | 'firstGroups' | 'groups'>): void {
+    const ranges = pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]);
+    this.#device.queue.writeBuffer(this.pageRanges, 0, Uint32Array.from(ranges));
+    this.#device.queue.writeBuffer(this.limits, 0, Uint32Array.of(pages.length, this.capacity, groups));
   }
 
   /** Makes {@link spare} as large as a rasterizer needs it; whatever was bound to it must be bound again. */
@@ -169,6 +186,7 @@ const groupBytes = (groups: number, pages: number) => ({
   visibleBits: 4 * constants.WORDS_PER_GROUP * groups,
   groupOffsets: scanBytes(groups),
   plan: PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages),
+  pageRanges: 8 * Math.max(1, pages),
 });
 
 /** Most projected splats that one storage buffer of the device can hold. */

@@ -1,5 +1,5 @@
 /** The stages one by one, for tests and for those who build a pipeline of their own. */
-export { CapacityMonitor, LEAST_CAPACITY } from './capacity.js';
+export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
 export { CapacityMemory, type Capacity, type LookedAt } from './capacity-memory.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
 export * from './generated/depth-shaders.js';
