@@ -1,8 +1,7 @@
 /** The search for what a device is served best with: a second of trials, once for each adapter and origin. */
 import { mortonOrder } from '../pack/morton.js';
 import { LIKELY, SAFE, type Variants } from '../variants.js';
-import { FrameClock } from './frame-clock.js';
-import { FRAMES, isRight, timeFrames, type Trial } from './trials.js';
+import { FrameClock, FRAMES, isRight, timeFrames, type Trial } from './trials.js';
 
 /** Scenes of the trials: until one candidate is left, or the time is up. */
 const ROUNDS: readonly Trial[] = [
