@@ -11,7 +11,7 @@ import {
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
 import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
-import { waitForRest } from '../../packages/element/src/pace/rest.js';
+import { waitForRest } from '../../packages/element/src/pace/start.js';
 import { COSTS, LEVELS } from '../support/pace-gpu.js';
 
 await fetchLaw();

@@ -6,7 +6,6 @@ export * from './gaussian-cloud.js';
 export * from './linear.js';
 export * from './load-module.js';
 export * from './part-request.js';
-export * from './part-url.js';
 export * from './vector.js';
 export * from './onnx/index.js';
 export * from './contract/index.js';

@@ -3,8 +3,7 @@ import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
 import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
 import type { keepPace, resized } from '../pace/pace.js';
-import { waitForRest } from '../pace/rest.js';
-import { INITIAL_PACE, quantile, type Pace, type PaceReason } from '../pace/start.js';
+import { INITIAL_PACE, quantile, waitForRest, type Pace, type PaceReason } from '../pace/start.js';
 
 /** How levels are chosen: nothing that a first picture waits for. Without it all pictures are whole. */
 let law: { readonly keepPace: typeof keepPace; readonly resized: typeof resized } | undefined;

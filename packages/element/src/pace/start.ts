@@ -1,4 +1,4 @@
-/** The pace before anything is known; the law that it follows from then on (`pace.ts`) is fetched once a picture is there. */
+/** The pace before anything is known, and when a motion is over; the law that the pace follows from then on (`pace.ts`) is fetched once a picture is there. */
 import type { MeasuredLevels } from './time-model.js';
 
 /** Why the level is what it is: `start`, nothing is known yet; `slow`, frames took too long; `spare`, there was time to spare; `trial`, to find out what a more accurate level takes. */
@@ -48,4 +48,21 @@ export const INITIAL_PACE: Pace = {
 export function quantile(values: readonly number[], share: number): number {
   const sorted = [...values].sort((a, b) => a - b);
   return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
+}
+
+/** The true image is to be on show so long after the last change, ms. */
+const SHOWN_BY_MS = 300;
+/** Timers come so much late even on idle pages, ms. */
+const TIMER_MS = 2;
+/** Bounds on how long it is waited whether more changes come: those of a hand that moves slowly come within the latter, and none sooner than the former. */
+const [LEAST_WAIT_MS, LONGEST_WAIT_MS] = [50, 150];
+
+/**
+ * How long after the last change the true image is begun, ms: as late as it can be and still be there in time, since a hand that goes on meanwhile would
+ * have to wait for it.
+ * @param wholeMs what the true image takes, 0 where that is not known
+ * @param intervalMs between two pictures of the display: a change is drawn with the next, and so is a frame that is asked for
+ */
+export function waitForRest(wholeMs: number, intervalMs: number): number {
+  return Math.max(LEAST_WAIT_MS, Math.min(LONGEST_WAIT_MS, SHOWN_BY_MS - wholeMs - 2 * intervalMs - TIMER_MS));
 }

@@ -1,9 +1,8 @@
 import { loadModule } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
-import { FrameClock } from './frame-clock.js';
 import { keyFor, pageStore, readChoice, writeChoice, type ChoiceStore } from './kept-choice.js';
-import { ANSWER_TARGET, isRight, timeFrames, type Trial } from './trials.js';
+import { ANSWER_TARGET, FrameClock, isRight, timeFrames, type Trial } from './trials.js';
 import type { RendererOptions } from '../frame-request.js';
 import { Renderer } from '../renderer.js';
 

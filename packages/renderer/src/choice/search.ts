@@ -2,8 +2,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { mortonOrder } from '../pack/morton.js';
 import { LIKELY, SAFE, type Variants } from '../variants.js';
-import { FrameClock } from './frame-clock.js';
-import { FRAMES, isRight, timeFrames, type Trial } from './trials.js';
+import { FrameClock, FRAMES, isRight, timeFrames, type Trial } from './trials.js';
 
 /** Scenes of the trials: until one candidate is left, or the time is up. */
 const ROUNDS: readonly Trial[] = [

@@ -2,10 +2,10 @@
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import type { mortonOrder } from '../pack/morton.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
+import { QueueClock } from '../gpu/queue-clock.js';
 import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { Variants } from '../variants.js';
-import type { FrameClock } from './frame-clock.js';
 import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
 
 /** Frames of a trial. */
@@ -76,4 +76,27 @@ export async function timeFrames(
   renderer.destroy();
   gaussians.destroy();
   return time;
+}
+
+/** Times frames of which several are drawn in a row, the queue drained once. */
+export class FrameClock {
+  readonly #clock: QueueClock;
+
+  static async on(device: GPUDevice): Promise<FrameClock> {
+    const clock = QueueClock.of(device);
+    await clock.calibrate();
+    return new FrameClock(clock);
+  }
+
+  private constructor(clock: QueueClock) {
+    this.#clock = clock;
+  }
+
+  /** Milliseconds of each of `count` frames that `draw` submits. */
+  async time(count: number, draw: () => void): Promise<number> {
+    const begin = performance.now();
+    for (let frame = 0; frame < count; frame++) draw();
+    const { now } = await this.#clock.done();
+    return Math.max(0, now - begin - this.#clock.latency) / count;
+  }
 }
