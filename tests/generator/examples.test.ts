@@ -19,6 +19,7 @@ import {
 } from '@gaussian-splat/core';
 import {
   bindInputs,
+  groupInstances,
   inputsOfInstances,
   stackInputs,
   type GeneratorState,
@@ -62,6 +63,21 @@ test('there are examples of every kind that is said to ship', () => {
   const listed = readFileSync(`${root}README.md`, 'utf8');
   assert.ok(names.length >= 6, names.join());
   for (const name of names) assert.ok(listed.includes(`[${name}]`), `README.md has no row for ${name}`);
+});
+
+test('ten of the avatar that ships are one run', async () => {
+  const header = await readOnnxHeader(bytesSource(read('walker/model.onnx')));
+  const { contract } = resolveContract({ header });
+  const one = oneInstance(header, contract);
+  const [joints] = header.inputs.find(({ name }) => name === 'pose')!.dims!.slice(1) as number[];
+  const ten = Array.from({ length: 10 }, (_, i) => ({
+    inputs: bindInputs(one, contract, { pose: Array.from({ length: 3 * joints }, (__, k) => Math.sin(i + k)) }),
+  }));
+  const groups = groupInstances(ten, inputsOfInstances(header, contract), contract.instances!.most);
+  assert.deepEqual(
+    groups.map((group) => group.length),
+    [10],
+  );
 });
 
 const skipOf = (name: string): string | false => (DAILY.includes(name) ? false : onlyInLab);

@@ -60,6 +60,8 @@ export class ControlsPanel {
   readonly #box: HTMLElement;
   /** Rotations of joints as people turn them, axis-angle, by the name of the input. */
   readonly #turns = new Map<string, number[]>();
+  /** Show what the page has set meanwhile, one for each control. */
+  #refreshers: (() => void)[] = [];
   #told = '';
 
   private constructor(element: PanelHost) {
@@ -74,7 +76,9 @@ export class ControlsPanel {
     element.addEventListener('inputs-change', () => this.#update());
     element.addEventListener('timeupdate', () => this.#showTime());
     element.addEventListener('emptied', () => this.#update());
-    new MutationObserver(() => this.#update()).observe(element, { attributeFilter: ['controls-panel'] });
+    // A page may set controls and poses itself: as attributes, which are noticed, or by properties, which are looked up before anybody turns a control.
+    new MutationObserver(() => this.#update()).observe(element, { attributes: true });
+    for (const type of ['pointerenter', 'focusin']) this.#box.addEventListener(type, () => this.#refresh());
   }
 
   /** The panel of an element: made at the first call. */
@@ -89,9 +93,11 @@ export class ControlsPanel {
     const { inputs, controlsPanel } = this.#element;
     this.#box.hidden = !controlsPanel || inputs.length === 0;
     const told = JSON.stringify(inputs);
-    if (told === this.#told || this.#box.hidden) return;
+    if (this.#box.hidden) return;
+    if (told === this.#told) return this.#refresh();
     this.#told = told;
     this.#turns.clear();
+    this.#refreshers = [];
     const controls = inputs.flatMap((input) => this.#controlsOf(input));
     const title = this.#word('controls-panel');
     this.#box.setAttribute('aria-label', title);
@@ -104,6 +110,10 @@ export class ControlsPanel {
     details.append(summary, ...controls, reset);
     this.#box.replaceChildren(details);
     this.#box.hidden = controls.length === 0;
+  }
+
+  #refresh(): void {
+    for (const refresh of this.#refreshers) refresh();
   }
 
   #controlsOf(input: GeneratorInput): HTMLElement[] {
@@ -119,11 +129,13 @@ export class ControlsPanel {
     return Array.from({ length: Math.min(size, MOST_SLIDERS) }, (_, i) => {
       const title = names?.[i] ?? (size > 1 ? `${label} ${i + 1}` : label);
       const now = (): readonly number[] => this.#valuesOf(name) ?? initial;
-      return slider(title, range, step, now()[i] ?? now()[0], (value) => {
+      const control = slider(title, range, step, now()[i] ?? now()[0], (value) => {
         const values = Array.from({ length: size }, (__, k) => now()[k] ?? now()[0]);
         values[i] = value;
         this.#set(name, values);
       });
+      this.#refreshers.push(() => showValue(control, now()[i] ?? now()[0]));
+      return control;
     });
   }
 
@@ -156,9 +168,14 @@ export class ControlsPanel {
         this.#element.pose = poseOf(turns, input);
       }),
     );
-    choice.addEventListener('change', () =>
-      axes.forEach((axis, k) => showValue(axis, turns[3 * Number(choice.value) + k])),
-    );
+    const showTurns = (): void => axes.forEach((axis, k) => showValue(axis, turns[3 * Number(choice.value) + k]));
+    choice.addEventListener('change', showTurns);
+    this.#refreshers.push(() => {
+      const set = format === 'axis-angle' ? readNumbers(this.#element.pose) : undefined;
+      if (set?.length !== turns.length) return;
+      turns.splice(0, turns.length, ...set);
+      showTurns();
+    });
     return [labelled(this.#word('controls-joint'), choice), ...axes];
   }
 
