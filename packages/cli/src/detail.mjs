@@ -15,7 +15,7 @@ import {
   treeOfCopies,
   USUAL_STEPS,
 } from '@gaussian-splat/renderer';
-import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
+import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { findSteps } from './lib/coded-pages.mjs';
 import { deflate } from './lib/deflate.mjs';
 import { writeWhole } from './lib/output-file.mjs';
@@ -188,7 +188,7 @@ function writeFolder(out, writePages) {
 async function main({ scene, out, degree, geometry, minDecibels, columns, rows, spacing }) {
   const openPart = (path) => readWhole(join(dirname(scene), path));
   const cloud = upTo(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
-  for (const warning of cloud.warnings ?? []) console.error(`${scene}: ${warning}`);
+  sayWarnings(scene, cloud);
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();

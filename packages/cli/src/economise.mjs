@@ -13,7 +13,7 @@ import {
   viewsBetween,
 } from '@gaussian-splat/economise';
 import { inline } from '@gaussian-splat/economise/parts';
-import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
+import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { encodeWebp } from './lib/webp.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
@@ -189,6 +189,7 @@ async function main({
   GpuEvaluator.prepare(device);
   const opened = seconds();
   const cloud = await reading;
+  sayWarnings(scene, cloud);
   // What this format has no place for is told before a picture is drawn.
   encodingsFor(out, cloud);
   // What is left of it when the device is there.

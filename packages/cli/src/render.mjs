@@ -4,7 +4,7 @@ import { PNG } from 'pngjs';
 import { cameraFromCalibration, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
-import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
+import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
 import { readJson } from './lib/read-json.mjs';
@@ -125,7 +125,7 @@ async function render(options) {
   checkFiles(options);
   const camera = readCamera(options.camera, options.view);
   const cloud = await readSceneFile(options.scene);
-  for (const warning of cloud.warnings ?? []) console.error(`${options.scene}: ${warning}`);
+  sayWarnings(options.scene, cloud);
   const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
 
   const adapter = await requestNodeAdapter();

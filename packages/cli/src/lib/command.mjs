@@ -27,6 +27,11 @@ export function parseSceneOptions(args, options) {
   return { values, scene: positionals[0] };
 }
 
+/** Says on the error stream what of a scene file is not used. */
+export function sayWarnings(scene, { warnings = [] }) {
+  for (const warning of warnings) console.error(`${scene}: ${warning}`);
+}
+
 /** Whether the file system says it: ENOENT, EACCES, ENOSPC. Its sentence is enough for people. */
 const isOfFiles = ({ code, syscall }) => syscall !== undefined || /^E[A-Z]+$/.test(code);
 

@@ -1,5 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { readScene, splatRanges, type SplatRanges } from '@gaussian-splat/formats';
+import { MOST_DROPPED, readScene, splatRanges, type SplatRanges } from '@gaussian-splat/formats';
 import { allocateColumns, closeGaps, type Columns } from './cloud-memory.js';
 import type { PartRead } from './read-part.js';
 import { partsOf, poolFor, type Part, type TaskPool } from './task-pool.js';
@@ -28,7 +28,7 @@ export async function readInParts(
 /**
  * Has the splats of a file read part by part into memory that tasks share.
  * @param readAll reads parts into columns, as `readBlocks` does
- * @returns undefined if the scene is too small for parts, or no splat can be drawn
+ * @returns undefined if the scene is too small for parts, or so much of it cannot be drawn that those should say why who read it whole
  */
 export async function gatherParts(
   { count, shDegree }: SplatRanges,
@@ -43,13 +43,18 @@ export async function gatherParts(
     columns,
     read.map((part, k) => ({ first: parts[k].first, count: part.count })),
   );
-  if (kept.count === 0) return undefined;
+  const droppedCount = count - kept.count;
+  if (droppedCount > MOST_DROPPED * count) return undefined;
   const antialiased = read.some((part) => part.antialiased);
   return {
     ...kept,
     origin: [0, 0, 0],
     antialiased,
     filterVariance: read.find((part) => part.filterVariance !== undefined)?.filterVariance,
-    droppedCount: count - kept.count,
+    droppedCount,
+    ...(droppedCount > 0 && {
+      faults: read[0].faults.map((_, k) => read.reduce((sum, { faults }) => sum + faults[k], 0)),
+    }),
+    warnings: [...new Set(read.flatMap(({ warnings }) => warnings))],
   };
 }

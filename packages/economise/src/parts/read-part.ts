@@ -12,6 +12,10 @@ export interface PartRead {
   readonly count: number;
   readonly antialiased: boolean;
   readonly filterVariance: number | undefined;
+  /** Of its splats: see `GaussianCloud.faults`. */
+  readonly faults: readonly number[];
+  /** Of the file: see `GaussianCloud.warnings`. */
+  readonly warnings: readonly string[];
 }
 
 /** Reads a part of a file block by block into columns, the places of the part's splats there being their numbers in the file. */
@@ -22,6 +26,8 @@ export async function readBlocks(
 ): Promise<PartRead> {
   let [count, antialiased] = [0, false];
   let filterVariance: number | undefined;
+  const faults = [0, 0, 0, 0];
+  const warnings = new Set<string>();
   for (let at = first; at < end; at += BLOCK) {
     const cloud = await read({ first: at, end: Math.min(end, at + BLOCK) });
     if (cloud === undefined) continue;
@@ -29,8 +35,10 @@ export async function readBlocks(
     count += cloud.count;
     antialiased ||= cloud.antialiased;
     filterVariance ??= cloud.filterVariance;
+    cloud.faults?.forEach((number, k) => (faults[k] += number));
+    for (const warning of cloud.warnings ?? []) warnings.add(warning);
   }
-  return { count, antialiased, filterVariance };
+  return { count, antialiased, filterVariance, faults, warnings: [...warnings] };
 }
 
 /** Reads a part of a file that lies in memory. */
