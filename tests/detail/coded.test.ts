@@ -101,6 +101,24 @@ for (const degree of [0, 1, 2, 3] as const) {
   });
 }
 
+test('coarser levels, which are far from the scene anyway, have coarser coordinates and harmonics', async () => {
+  const tree = buildDetailTree(withHarmonics(pebbles(6_000), 1), { geometry: 'quantized' });
+  const coding = codingOf(USUAL_STEPS);
+  const encoder = new PageEncoder(tree, coding, deflate);
+  const scene = manifestOf(tree, [], String, coding);
+  const steps: number[][] = tree.levels.map(() => []);
+  for (const page of cutPages(tree)) {
+    const { chunks, upper, holds } = page;
+    const file = { chunks, upper, shDegree: 1, coding } as const;
+    const words = new Float32Array(await decodePage('page', encoder.encode(page), file));
+    const layout = pageLayout(scene, chunks);
+    const stride = layout.geometry / chunks;
+    holds.forEach(([level], c) => steps[level].push(words[layout.chunks + layout.details + stride * c + 4]));
+  }
+  const [fine, coarse] = steps.map((own) => own.reduce((sum, step) => sum + step, 0) / own.length);
+  assert.ok(coarse > 4 * fine, `${coarse} and ${fine} between two coordinates`);
+});
+
 /** dB of a streamed scene, all of whose pages are there, from the scene that was loaded whole. */
 async function closenessOf(cloud: GaussianCloud, steps: PageSteps): Promise<{ decibels: number; bytes: number }> {
   const device = await anyDevice();

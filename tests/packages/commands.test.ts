@@ -94,12 +94,16 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
   write('lod-meta.json', { lodLevels: 2, filenames: ['a/meta.json', 'b.sog'], environment: './sky/meta.json' });
   write('detail.json', { trees: [{ pages: [{ file: 'pages/0.bin' }, { file: 'pages/1.bin' }] }] });
   write('film.json', { gaussianSplatSequence: 1, framesPerSecond: 2, frames: 'frame-{09}.spz', count: 2 });
+  for (const part of ['ball.sog', 'move-7.bin', 'move-8.bin', 'move-9.bin']) write(part, 'splats');
+  const moving = { gaussianSplatSequence: 2, framesPerSecond: 2, first: 'ball.sog', framesPerFile: 5, count: 11 };
+  write('moving.json', { ...moving, motion: 'move-{7}.bin' });
   const within = (folder: string): string[] => ['meta.json', ...images].map((name) => folder + name).sort();
   const expected: [string, string[]][] = [
     ['meta.json', within('')],
     ['lod-meta.json', [...within('a/'), 'b.sog', 'lod-meta.json', ...within('sky/')].sort()],
     ['detail.json', ['detail.json', 'pages/0.bin', 'pages/1.bin']],
     ['film.json', ['film.json', 'frame-09.spz', 'frame-10.spz']],
+    ['moving.json', ['ball.sog', 'move-7.bin', 'move-8.bin', 'moving.json']],
   ];
   for (const [scene, files] of expected) {
     assert.deepEqual(

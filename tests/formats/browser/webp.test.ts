@@ -1,8 +1,10 @@
 /** Our decoder of lossless WebP against Chromium's, byte for byte, on real images; and their times. */
 import type * as Decoder from '../../../packages/formats/dist/webp/decode.js';
+import type * as Native from '../../../packages/formats/dist/webp/native.js';
 
 /** Not part of the package's surface, so it is taken from where the build puts it. */
 const BUILT: string = '/packages/formats/dist/webp/decode.js';
+const BUILT_NATIVE: string = '/packages/formats/dist/webp/native.js';
 
 const IMAGES = [
   'scenes/logo-sog-v1/means_l.webp',
@@ -36,8 +38,10 @@ async function decodeInBrowser(file: Uint8Array<ArrayBuffer>): Promise<Uint8Arra
 
 describe('lossless WebP', () => {
   let decodeWebp: typeof Decoder.decodeWebp;
+  let decodeNatively: typeof Native.decodeNatively;
   before(async () => {
     ({ decodeWebp } = (await import(BUILT)) as typeof Decoder);
+    ({ decodeNatively } = (await import(BUILT_NATIVE)) as typeof Native);
   });
 
   for (const name of IMAGES) {
@@ -46,8 +50,15 @@ describe('lossless WebP', () => {
       if (!response.ok) return this.skip();
       const file = new Uint8Array(await response.arrayBuffer());
       const start = performance.now();
-      const { pixels } = decodeWebp(file);
+      const { width, height, pixels } = decodeWebp(file);
       const ours = performance.now() - start;
+      const native = await decodeNatively(file, { width, height });
+      const theirs = performance.now() - start - ours;
+      if (file.length >= 4096) {
+        if (native === undefined) throw new Error('Chromium has a decoder that is exact');
+        const at = native.pixels.findIndex((pixel, i) => pixel !== pixels[i]);
+        if (at >= 0 || native.pixels.length !== pixels.length) throw new Error(`pixel ${at} is another by Chromium's`);
+      }
       const expected = await decodeInBrowser(file);
       if (expected.length !== 4 * pixels.length) throw new Error(`${pixels.length} pixels, not ${expected.length / 4}`);
       for (let i = 0; i < pixels.length; i++) {
@@ -58,7 +69,7 @@ describe('lossless WebP', () => {
         if (!isSame || p >>> 24 !== expected[e + 3])
           throw new Error(`pixel ${i} is ${p.toString(16)}, not ${expected.slice(e, e + 4)}`);
       }
-      console.log(`${name}: ${pixels.length} pixels in ${ours.toFixed(0)} ms`);
+      console.log(`${name}: ${pixels.length} pixels in ${ours.toFixed(0)} ms, by the browser ${theirs.toFixed(0)} ms`);
     });
   }
 });

@@ -4,6 +4,7 @@ import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
 import type { OpenPart, SceneSource } from '../scene-format.js';
 import { decodeWebp, webpSize, type WebpImage } from '../webp/decode.js';
+import { decodeNatively } from '../webp/native.js';
 import { WebpError } from '../webp/webp-error.js';
 
 /** Pixels that a plane may have beyond one for each splat: rows and columns that only fill a rectangle. */
@@ -35,8 +36,8 @@ export class Planes {
   }
 
   /** A plane with one pixel for each splat: at least `count` pixels, and not many more. */
-  decodePlane(bytes: Uint8Array, file: string, count: number): Uint32Array {
-    const { pixels } = this.decode(bytes, file, 2 * count + SPARE_PIXELS);
+  async decodePlane(bytes: Uint8Array, file: string, count: number): Promise<Uint32Array> {
+    const { pixels } = await this.decode(bytes, file, 2 * count + SPARE_PIXELS);
     if (pixels.length < count) {
       throw damaged(
         `${this.#source.name}, ${file}`,
@@ -48,7 +49,7 @@ export class Planes {
   }
 
   /** Any image of at most `maxPixels`; its header is asked before anything is allocated. */
-  decode(bytes: Uint8Array, file: string, maxPixels: number): WebpImage {
+  async decode(bytes: Uint8Array, file: string, maxPixels: number): Promise<WebpImage> {
     const { signal, name, budget } = this.#source;
     signal?.throwIfAborted();
     if (this.#last?.file === file) return this.#last.image;
@@ -61,7 +62,7 @@ export class Planes {
       }
       // Pixels, and those before a transform of their own size is undone.
       take(8 * width * height);
-      const image = decodeWebp(bytes, take);
+      const image = (await decodeNatively(bytes, { width, height })) ?? decodeWebp(bytes, take);
       this.#last = { file, image };
       return image;
     } catch (cause) {

@@ -49,9 +49,9 @@ export async function readSogImages(meta: SogMeta, open: OpenPart, source: Scene
   if (previewWanted(source, count))
     await source.onPreview?.(sparse(unpackGeometry(planes, meta, PREVIEW_STEP, 0, source)));
   if (!meta.shN || !harmonics) return unpackGeometry(planes, meta, 1, 0, source);
-  const palette = images.decode(await harmonics[0], meta.shN.files[0], MAX_PALETTE_PIXELS);
+  const palette = await images.decode(await harmonics[0], meta.shN.files[0], MAX_PALETTE_PIXELS);
   const degree = checkDegree(meta, palette.width, name);
-  const labels = images.decodePlane(await harmonics[1], meta.shN.files[1], count);
+  const labels = await images.decodePlane(await harmonics[1], meta.shN.files[1], count);
   const cloud = unpackGeometry(planes, meta, 1, degree, source);
   unpackHarmonics(labels, paletteOf(meta.shN, palette), cloud);
   return cloud;
@@ -71,7 +71,9 @@ async function decodeGeometry(images: Planes, meta: SogMeta, name: string): Prom
       'decode/header',
     );
   }
-  const [low, high, scales, quats, sh0] = files.map((file, k) => images.decodePlane(loaded[k], file, meta.count));
+  const decoded: Uint32Array[] = [];
+  for (const [k, file] of files.entries()) decoded.push(await images.decodePlane(loaded[k], file, meta.count));
+  const [low, high, scales, quats, sh0] = decoded;
   return { low, high, scales, quats, sh0 };
 }
 

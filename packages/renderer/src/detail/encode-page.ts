@@ -30,6 +30,8 @@ const SIZE_RANK = 0.35;
 const REFERENCE_RANK = 0.9;
 /** Coefficients above the constant one are taken for 0 below this share of a step: zeros cost hardly a bit. */
 const DEAD_ZONE = 0.62;
+/** Levels above the finest are so far from the scene that steps four times as large show nothing: octaves. */
+const COARSE_OCTAVES = 2;
 /** Of a luma and of each difference: their sum is a byte. */
 const MOST_HARMONIC = 42;
 /** Steps of what is rounded, in no unit that they share. */
@@ -112,6 +114,7 @@ export class PageEncoder {
   readonly #keepsOrder: boolean;
   /** See {@link classOf}. */
   readonly #reference: number;
+  readonly #finest: SplatLevel;
 
   /** @param coding of all files of the folder */
   constructor(tree: DetailTree, coding: WrittenCoding, deflate: Deflate) {
@@ -123,6 +126,7 @@ export class PageEncoder {
     const [leaves] = tree.levels;
     const weights = Float64Array.from({ length: leaves.count }, (_, i) => weightOf(leaves, i)).sort();
     this.#reference = weights[Math.floor(REFERENCE_RANK * (weights.length - 1))];
+    this.#finest = leaves;
   }
 
   /** The file of a page. */
@@ -142,7 +146,8 @@ export class PageEncoder {
     const floats = new Float32Array(CHUNK_FLOATS * chunks + FILE_FLOATS);
     holds.forEach(([level, chunk], k) => {
       const splats = this.#ordered(levels[level], CULL_GROUP * chunk, counts[k]);
-      const reach = putSplats(levels[level], splats, least, this.#coding, this.#reference, planes);
+      const reference = this.#reference + this.#octavesOf(levels[level]);
+      const reach = putSplats(levels[level], splats, least, this.#coding, reference, planes);
       floats.set([...splats.origin, splats.step, reach, ...rowOf(errors[level], chunk)], CHUNK_FLOATS * k);
     });
     const [level, chunk] = holds[0];
@@ -151,12 +156,17 @@ export class PageEncoder {
     return joined(headOf(counts, floats, { chunks, shDegree }), planes, this.#deflate);
   }
 
+  /** How much coarser than those of the finest level steps are. */
+  #octavesOf(level: SplatLevel): number {
+    return level === this.#finest ? 0 : COARSE_OCTAVES;
+  }
+
   /** Splats of a chunk along a curve through it, on which coordinates differ little from one to the next. */
   #ordered(level: SplatLevel, first: number, count: number): Ordered {
     const own = level.positions.subarray(3 * first, 3 * (first + count));
     const origin = [0, 1, 2].map((axis) => extremeOf(own, axis, Math.min));
     const extent = Math.max(...origin.map((low, axis) => extremeOf(own, axis, Math.max) - low));
-    const size = this.#coding.place * typicalSize(level, first, count);
+    const size = this.#coding.place * typicalSize(level, first, count) * 2 ** this.#octavesOf(level);
     const step = Math.fround(Math.max(size, (1.0001 * extent) / MOST_PLACES));
     const splats = Array.from({ length: count }, (_, k) => {
       const [x, y, z] = origin.map((low, axis) => (step > 0 ? Math.round((own[3 * k + axis] - low) / step) : 0));

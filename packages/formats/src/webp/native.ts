@@ -1,0 +1,77 @@
+import { decodeWebp, type WebpImage } from './decode.js';
+
+/** 6 x 6 pixels of many colours, of alpha 0 to 255, and without alpha: what a decoder that premultiplies or converts colours would change. */
+const PROBES = [
+  'UklGRq4AAABXRUJQVlA4TKEAAAAvBUABEE2UIaL/sYiI/gfYtLbdhoALCG+Ng2lYnixdBB49BkzAJFumKHtHUIEwimQrzhEkIAEHIAEJLQEdCMlt0xABkRAXuwJGtW2DamAkhQrmOlhmguihwY4ggiWBCCL89UcG0rZJle3Krj3y3Ip/qD/TxF6uTv3nMWrx0wAoxwDCb0oPfeKKABhh8wX0kYEVF7q6GSSAG2zV0pYC8AMEAAA=',
+  'UklGRqAAAABXRUJQVlA4TJMAAAAvBUABAE2UIaL/sYiI/gfYtLbdhoALCG+Ng2lYnixdBB49BkzAJFumKHtHUIEwimQrzhEkIAEHIAEJLQEdCMlt0xABkRAXuwJGtW2DamAkhQrmOlhmguihwY4ggiWBCCL89UcReW7xD/2ZxF7q1OcxWvwaQDkDhH9Kjz65IsCIzRf0kWHloqvbkIAbtrq0VYAfCAAA',
+];
+/** The kind of the only chunk of a file that has nothing but its pixels, at byte 12: others may ask for colours or turns that a browser heeds. */
+const PLAIN = [0x56, 0x50, 0x38, 0x4c];
+/** Below so many bytes our decoder is done sooner. */
+const LEAST_BYTES = 4096;
+
+let isExact: Promise<boolean> | undefined;
+
+/**
+ * Decodes a lossless WebP image by the browser's own decoder, off this thread, where there is one and it gives exact pixels, which is tried once.
+ * @returns undefined where it is left to {@link decodeWebp}, which also says what is wrong with a file
+ */
+export async function decodeNatively(
+  file: Uint8Array,
+  size: Pick<WebpImage, 'width' | 'height'>,
+): Promise<WebpImage | undefined> {
+  if (file.length < LEAST_BYTES || PLAIN.some((byte, k) => file[12 + k] !== byte)) return undefined;
+  if (typeof ImageDecoder !== 'function') return undefined;
+  if (!(await (isExact ??= findExact()))) return undefined;
+  const image = await decode(file).catch(() => undefined);
+  return image?.width === size.width && image.height === size.height ? image : undefined;
+}
+
+async function findExact(): Promise<boolean> {
+  try {
+    for (const probe of PROBES) {
+      const file = Uint8Array.from(atob(probe), (character) => character.charCodeAt(0));
+      const { pixels } = await decode(file);
+      const expected = decodeWebp(file).pixels;
+      if (pixels.length !== expected.length || !pixels.every((pixel, i) => pixel === expected[i])) return false;
+    }
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+async function decode(file: Uint8Array): Promise<WebpImage> {
+  const decoder = new ImageDecoder({
+    data: file as Uint8Array<ArrayBuffer>,
+    type: 'image/webp',
+    colorSpaceConversion: 'none',
+  });
+  try {
+    const { image } = await decoder.decode();
+    try {
+      return await pixelsOf(image);
+    } finally {
+      image.close();
+    }
+  } finally {
+    decoder.close();
+  }
+}
+
+async function pixelsOf(image: VideoFrame): Promise<WebpImage> {
+  const { codedWidth: width, codedHeight: height, format } = image;
+  // Where the first and the third byte go to.
+  const [first, third] = format?.startsWith('RGB') ? [16, 0] : [0, 16];
+  if (!/^(RGB|BGR)[AX]$/.test(format ?? '')) throw new Error(`pixels of format ${format}`);
+  const pixels = new Uint32Array(width * height);
+  const [{ offset, stride }] = await image.copyTo(pixels, { layout: [{ offset: 0, stride: 4 * width }] });
+  if (offset !== 0 || stride !== 4 * width) throw new Error('pixels that lie elsewhere');
+  const opaque = format!.endsWith('X') ? 0xff000000 : 0;
+  if (opaque === 0 && third === 16) return { width, height, pixels };
+  for (let i = 0; i < pixels.length; i++) {
+    const pixel = pixels[i];
+    pixels[i] = ((pixel & 0xff00ff00) | opaque | ((pixel & 255) << first) | (((pixel >>> 16) & 255) << third)) >>> 0;
+  }
+  return { width, height, pixels };
+}
