@@ -85,17 +85,22 @@ function writeLicences() {
 /** The bundle is without comments, and the licences of what is in it ask for their text. */
 function writeLicencesOfBundle() {
   const own = readFileSync(join(root, 'LICENSE'), 'utf8');
+  const textOf = ([what, file]) => `${what}\n\n${readFileSync(join(root, file), 'utf8')}`;
   const others = [
     ['Lit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js', 'node_modules/lit/LICENSE'],
     ['fflate, in readers/', 'node_modules/fflate/LICENSE'],
     ['three.js, in the script that is fetched for meshes', 'node_modules/three/LICENSE'],
     // Its decoder comes with three.js, without a text beside it.
     ['meshoptimizer, in the same', 'packages/element/third-party/meshoptimizer/LICENSE'],
-    // Its npm package has neither.
-    ['ONNX Runtime, in onnxruntime/', `${RUNTIME_LICENCES}/LICENSE`],
+  ].map(textOf);
+  // Its npm package has neither.
+  const runtime = [
+    ['ONNX Runtime', `${RUNTIME_LICENCES}/LICENSE`],
     ['What ONNX Runtime is made of', `${RUNTIME_LICENCES}/ThirdPartyNotices.txt`],
-  ].map(([what, file]) => `${what}\n\n${readFileSync(join(root, file), 'utf8')}`);
-  writeFileSync(join(root, 'packages/element/cdn/LICENSES.txt'), [`gaussian-splat\n\n${own}`, ...others].join('\n\n'));
+  ].map(textOf);
+  const cdn = join(root, 'packages/element/cdn');
+  writeFileSync(join(cdn, 'LICENSES.txt'), [`gaussian-splat\n\n${own}`, ...others].join('\n\n'));
+  writeFileSync(join(cdn, 'onnxruntime/LICENSES.txt'), runtime.join('\n\n'));
 }
 
 /** What editors and tools know of the element, from its sources. */

@@ -36,6 +36,12 @@ const shortText = {
   renderChunk: (code) => transform(code, { format: 'esm', target: 'es2022', minify: true, legalComments: 'inline' }),
 };
 
+/** TypeScript takes them from the sources and leaves them there. */
+const typesOfThree = {
+  name: 'types-of-three',
+  writeBundle: () => cpSync(path('./src/meshes/three.d.ts'), path('./dist/meshes/three.d.ts')),
+};
+
 const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
@@ -71,8 +77,12 @@ const workerBeside = {
   load: (id) => (id === path('./dist/loading/own-worker.js') ? `export * from './own-worker-cdn.js'` : null),
 };
 
-/** Chunks carry a hash in their name, so those of earlier builds would pile up. */
-const emptyFirst = { name: 'empty-first', buildStart: () => rmSync(path('./cdn'), { recursive: true, force: true }) };
+/** Chunks are called by what is in them, and most carry a hash: those of earlier builds would pile up. */
+const MADE = ['./cdn', './dist/production', './dist/loading/worker-code'];
+const emptyFirst = {
+  name: 'empty-first',
+  buildStart: () => MADE.forEach((folder) => rmSync(path(folder), { recursive: true, force: true })),
+};
 
 /** ONNX Runtime for generators, in both its builds: fetched by pages that show a generator, and by no other. */
 const RUNTIME_FILES = [
@@ -108,7 +118,7 @@ export default [
   {
     // three.js, as much as meshes need: a package of 24 MB otherwise.
     input: { three: path('./scripts/three.mjs') },
-    plugins: [nodeResolve({ exportConditions: ['production', 'browser'] }), shortText],
+    plugins: [nodeResolve({ exportConditions: ['production', 'browser'] }), shortText, typesOfThree],
     output: { dir: path('./dist/meshes'), format: 'es', entryFileNames: '[name].js', chunkFileNames: '[name].js' },
   },
   {
@@ -135,11 +145,13 @@ export default [
   },
   {
     input: { index: path('./dist/index.js'), element: path('./dist/element.js'), scenes: path('./dist/scenes.js') },
+    // Imports for nothing but their effects, which these do not have, would make bundlers warn.
+    treeshake: { moduleSideEffects: (_, isExternal) => !isExternal },
     // Lit and the errors' class may be the app's own, too.
     external: (id) => /^(lit|@lit|@gaussian-splat\/core$)/.test(id) || KEPT.test(id),
     plugins,
     output: {
-      ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500 },
+      ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500, hoistTransitiveImports: false },
       entryFileNames: 'production/[name].js',
       chunkFileNames: (chunk) => `production/${nameOf(chunk)}.js`,
     },
@@ -150,9 +162,9 @@ export default [
     output: { file: path('./dist/loading/scene-worker.bundle.js'), format: 'es', inlineDynamicImports: true },
   },
   {
-    // All in one module, for pages that are one file.
+    // All in one module, for `gaussian-splat page --single`.
     input: path('./dist/index.js'),
     plugins,
-    output: { file: path('./dist/single.js'), format: 'es', inlineDynamicImports: true },
+    output: { file: path('../cli/dist/single.js'), format: 'es', inlineDynamicImports: true },
   },
 ];

@@ -21,9 +21,10 @@ test('each chunk names what it needs and what it loads later, and nothing else',
   const all = await chunks();
   const names = Object.keys(all);
   assert.ok(names.length > 20 && names.includes('./scene-worker.js'), names.join());
+  const reached = new Set(['./scene-worker.js', ...names.flatMap((name) => all[name].needs)]);
   for (const name of names) {
     const { default: text } = await all[name].load();
-    assert.ok(text.startsWith(`"${name}":(exports,require,load)=>{`), `${name}: ${text.slice(0, 80)}`);
+    assert.ok(text.startsWith(`"${name}":(exports,require,gaussianSplatChunk)=>{`), `${name}: ${text.slice(0, 80)}`);
     assert.doesNotThrow(() => new Script(`({${text}})`), `${name} is a script, not a module`);
     const required = new Set([...all[name].needs, name]);
     assert.deepEqual(
@@ -31,12 +32,20 @@ test('each chunk names what it needs and what it loads later, and nothing else',
       [],
       `${name} requires`,
     );
+    const loaded = namesIn(text, 'gaussianSplatChunk');
     assert.deepEqual(
-      namesIn(text, 'load').filter((each) => !names.includes(each)),
+      loaded.filter((each) => !names.includes(each)),
       [],
       `${name} loads`,
     );
+    for (const each of loaded) reached.add(each);
   }
+  // What nobody asks for under that name is asked of a function of the code's own.
+  assert.deepEqual(
+    names.filter((name) => !reached.has(name)),
+    [],
+    'asked for by nobody',
+  );
 });
 
 test('the texts make the code of the worker: a reader of each format runs', { skip }, async () => {

@@ -13,6 +13,8 @@ import { serve } from './lib/server.mjs';
 const USAGE = 'gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]';
 const elementFile = (path) => fileURLToPath(new URL(path, import.meta.resolve('@gaussian-splat/element/package.json')));
 const CDN = elementFile('cdn');
+/** The element in one module, with all that it fetches later. */
+const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
 const { scene, folder, port, isServed, isSingle } = parseOptions();
@@ -42,8 +44,10 @@ async function writeSingle() {
     );
   const title = titleOf(scene);
   const name = JSON.stringify(basename(scene)).replaceAll('<', '\\u003c');
-  const script = `<script type="text/plain" id="scene">${readFileSync(scene).toString('base64')}</script>
-  <script type="module">${readFileSync(elementFile('dist/single.js'), 'utf8').replaceAll(/<(?=\/script|!--)/gi, '\\x3c')}</script>
+  const licences = readFileSync(join(CDN, 'LICENSES.txt'), 'utf8').replaceAll('--', '- -');
+  const script = `<!--\n${licences}-->
+  <script type="text/plain" id="scene">${readFileSync(scene).toString('base64')}</script>
+  <script type="module">${readFileSync(ELEMENT, 'utf8').replaceAll(/<(?=\/script|!--)/gi, '\\x3c')}</script>
   <script type="module">
     const data = await fetch('data:application/octet-stream;base64,' + document.getElementById('scene').textContent);
     document.querySelector('gaussian-splat').src = new File([await data.blob()], ${name});

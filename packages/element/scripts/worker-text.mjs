@@ -1,6 +1,9 @@
 /** The chunks of the worker's code as modules that export their text, and the list of them: see src/loading/own-worker.ts. */
 import { basename } from 'node:path';
 
+/** What a chunk calls for another. No name that the code has: one of its own would be called. */
+const LOAD = 'gaussianSplatChunk';
+
 /** For an output of Rollup in the format `cjs`, whose `require` and `exports` the worker brings. */
 export const workerAsText = {
   name: 'worker-as-text',
@@ -16,7 +19,7 @@ export const workerAsText = {
     },
     ...{ entryFileNames: '[name].js', chunkFileNames: '[name].js', externalLiveBindings: false },
   }),
-  renderDynamicImport: () => ({ left: 'load(', right: ')' }),
+  renderDynamicImport: () => ({ left: `${LOAD}(`, right: ')' }),
   // It has no address: what lies beside it, nobody knows.
   resolveImportMeta: () => 'undefined',
   generateBundle(_, bundle) {
@@ -27,7 +30,7 @@ export const workerAsText = {
     });
     for (const chunk of chunks) {
       delete bundle[chunk.fileName];
-      const text = `"./${chunk.fileName}":(exports,require,load)=>{${chunk.code.trim()}}`;
+      const text = `"./${chunk.fileName}":(exports,require,${LOAD})=>{${chunk.code.trim()}}`;
       const source = `export default ${JSON.stringify(text)};\n`;
       this.emitFile({ type: 'asset', fileName: `worker-code/${basename(chunk.fileName)}`, source });
     }

@@ -75,7 +75,7 @@ describe('the scene worker', () => {
     } finally {
       GaussianSplatElement.sceneLoader = original;
     }
-    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .* workerLocation/);
+    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .*workerLocation/);
   });
 
   it('lies where workerLocation says, and is named in the warning if it does not', async () => {

@@ -158,6 +158,6 @@ describe('a streamed SOG scene', () => {
     await asked(served, '0_0/meta.json');
     await close(element);
     GaussianSplatElement.sceneLoader = original;
-    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .* workerLocation/);
+    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .*workerLocation/);
   });
 });

@@ -198,7 +198,7 @@ describe('a streamed scene', () => {
     await close(element);
     stop();
     GaussianSplatElement.sceneLoader = original;
-    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .* workerLocation/);
+    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .*workerLocation/);
   });
 
   it('beside others makes do with less memory, and has a place', async () => {

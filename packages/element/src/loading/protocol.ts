@@ -16,6 +16,8 @@ import type {
 export interface FileRequest {
   /** Absolute URL: a worker's own base URL is not the page's. */
   readonly url: string;
+  /** What is there, for a worker that could not fetch it. */
+  readonly file?: Blob | undefined;
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;

@@ -105,7 +105,10 @@ export class SceneLoader {
     here: (code: Here) => Promise<T>,
     options?: Parameters<WorkerPool['run']>[3],
   ): Promise<T> {
-    return this.#pool.run(request, signal, async () => here(await this.#code()), options);
+    const run = (asked: WorkerRequest): Promise<T> =>
+      this.#pool.run(asked, signal, async () => here(await this.#code()), options);
+    const isHidden = origin === 'null' && (request.type === 'load' || request.type === 'file');
+    return isHidden ? withFile(request).then(run) : run(request);
   }
 
   async #code(): Promise<Here> {
@@ -118,6 +121,17 @@ export class SceneLoader {
       throw error;
     }
   }
+}
+
+/** Workers do not know `blob:` addresses of pages without an origin, from a disk or in a sandboxed frame: they get the file itself. */
+async function withFile<T extends { readonly request: FileRequest }>(asked: T): Promise<T> {
+  const { url } = asked.request;
+  if (!url.startsWith('blob:')) return asked;
+  const file = await fetch(url).then(
+    (response) => response.blob(),
+    () => undefined,
+  );
+  return { ...asked, request: { ...asked.request, file } };
 }
 
 function sequenceWithin(url: string): GaussianSplatError {

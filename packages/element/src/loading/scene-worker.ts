@@ -124,6 +124,9 @@ function serve(scope: WorkerScope): void {
     const work: Work = { abort: new AbortController() };
     const { signal } = work.abort;
     running.set(id, work);
+    const asked = 'request' in message && 'file' in message.request ? message.request : undefined;
+    // The name of the file is behind the address.
+    if (asked?.file) Object.assign(asked, { url: URL.createObjectURL(asked.file) + new URL(asked.url).hash });
     try {
       const [answer, transfer] = await answerTo(id, work, message);
       if (!signal.aborted) scope.postMessage({ type: 'answer', id, answer }, transfer);

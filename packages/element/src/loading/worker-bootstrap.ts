@@ -9,7 +9,7 @@ export type CodeAnswer =
   { readonly id: number; readonly texts: readonly string[] } | { readonly id: number; readonly failure: string };
 
 /**
- * The script of a worker made of text, for `spawnText`: a promise of its main chunk. The first message brings the port for its code. Each text is `"name":(exports,require,load)=>{…}`. They are run one after the
+ * The script of a worker made of text, for `spawnText`: a promise of its main chunk. The first message brings the port for its code. Each text is `"name":(exports,require,gaussianSplatChunk)=>{…}`. They are run one after the
  * other, and an answer without texts waits, too: the second of two that were asked for at the same time may need what came with the first, or be the same. It is written as text itself, since bundlers change functions.
  */
 export const BOOTSTRAP = `new Promise((start)=>addEventListener('message',({ports})=>{
