@@ -1,6 +1,8 @@
-/** A Vue app around the element. */
+/** The app of the page Vue. With scenes in the address it is what tests drive. */
 import '@gaussian-splat/element';
 import { createApp } from 'vue';
-import App from './App.vue';
+import Harness from './Harness.vue';
+import Product from './Product.vue';
 
-createApp(App).mount('#app');
+const isTested = new URLSearchParams(location.search).has('first');
+createApp(isTested ? Harness : Product).mount('#app');

@@ -14,11 +14,17 @@ interface AxeResults {
 /** Rows of long tables and lists are alike: some stand for all, unless SITE=full. */
 const ALIKE = ['tbody tr:nth-child(n + 5)', 'details.row:nth-of-type(n + 4)', 'details .field:nth-of-type(n + 4)'];
 
-/** Light on a phone, dark on a desk. */
-const SCREENS = [
+interface Screen {
+  readonly width: number;
+  readonly colorScheme: 'light' | 'dark';
+  readonly forcedColors?: 'active';
+}
+/** Light on a phone, dark on a desk; with SITE=full also a desk zoomed to 200 % whose system forces its colours. */
+const SCREENS: readonly Screen[] = [
   { width: 390, colorScheme: 'light' },
   { width: 1280, colorScheme: 'dark' },
-] as const;
+  ...(isFull ? [{ width: 640, colorScheme: 'light', forcedColors: 'active' } as const] : []),
+];
 
 export interface PageCheckOptions {
   /** Looks at the colours, which over a long document takes axe longer than all the rest. */
@@ -38,12 +44,13 @@ export async function checkPage(
   await tab.setViewportSize({ width: NARROWEST, height: 400 });
   assert.ok((await overflowOf(tab)) <= 0, `wider than ${NARROWEST} pixels`);
   await addAxe(tab);
-  for (const { width, colorScheme } of bothScreens ? SCREENS : SCREENS.slice(0, 1)) {
+  for (const { width, colorScheme, forcedColors } of bothScreens ? SCREENS : SCREENS.slice(0, 1)) {
     await tab.setViewportSize({ width, height: 400 });
-    await tab.emulateMedia({ colorScheme });
+    await tab.emulateMedia({ colorScheme, forcedColors: forcedColors ?? 'none' });
     assert.ok((await overflowOf(tab)) <= 0, `wider than ${width} pixels`);
     assert.deepEqual(await violations(tab, colors), [], `${width} pixels, ${colorScheme}`);
   }
+  await tab.emulateMedia({ forcedColors: 'none' });
   assert.deepEqual(faults, []);
 }
 

@@ -18,7 +18,7 @@ const QUERIES: Readonly<Record<string, string>> = {
 const WITHOUT_SCENES = ['/examples/', '/react/', '/vue/'];
 
 /** The document whose colours stand for those of all. */
-const LONGEST = '/docs/packages/element/';
+const LONGEST = '/docs/guide/troubleshooting/';
 const isDocument = (url: string): boolean => /^\/docs\/./.test(url);
 /** Documents have no scripts and one layout: `npm run test:site` and the laboratory open all of them, `npm test` one that has everything. */
 const isVisited = (url: string): boolean => isFull || url === LONGEST || DAILY.includes(url);

@@ -80,7 +80,7 @@ export function tableOfAttributes() {
 /** The table of a document. */
 export function attributeRows(attributes) {
   const row = ({ name, type, description, example, default: fallback = type.text === 'boolean' ? 'off' : '' }) =>
-    `| \`${name}\` |${fallback && ` ${fallback}`} | ${description.replace(/\s*\n\s*/g, ' ')} | \`${example}\` |`;
+    `| \`${name}\` |${fallback && ` ${fallback}`} | ${description.replace(/\s*\n\s*/g, ' ')} |${example ? ` \`${example}\`` : ''} |`;
   return ['| attribute | default | meaning | example |', '|---|---|---|---|', ...attributes.map(row)].join('\n');
 }
 
