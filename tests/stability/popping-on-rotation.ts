@@ -161,5 +161,3 @@ test('an order for each pixel does not pop: captured scenes', { skip: onlyInLab 
   // A tenth is the aim.
   holds('S1', 'largest jump with a window of 32, of that', share('window 32'), { atMost: 1, unit: '' });
 });
-  holds('S1', 'largest jump with a window of 32, of that', share('window 32'), { atMost: 0.1, unit: '' });
-});
