@@ -10,7 +10,7 @@
  * each pixel has not, followed to the next frame, is how far it jumps.
  *
  * Passes: while the camera turns or rolls, every frame is that of the exact order. No order is kept from frame to frame. With an order for each pixel the largest jump is
- * smaller than that of the order by z; a tenth is the aim.
+ * at most 0.15 of that of the order by z with the wide window, 0.34 with the narrow one.
  */
 import { test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
@@ -157,7 +157,6 @@ test('an order for each pixel does not pop: captured scenes', { skip: onlyInLab 
   for (const [name, curve] of drawn) chart('S1', name, curve);
   const share = (how: string): number => largest.get(how)! / largest.get('order by z')!;
   note('S1', 'largest jump of the order by z', largest.get('order by z')!, { unit: '' });
-  note('S1', 'largest jump with a window of 16, of that', share('window 16'), { unit: '' });
-  // A tenth is the aim.
-  holds('S1', 'largest jump with a window of 32, of that', share('window 32'), { atMost: 1, unit: '' });
+  holds('S1', 'largest jump with a window of 16, of that', share('window 16'), { atMost: 0.34, unit: '' });
+  holds('S1', 'largest jump with a window of 32, of that', share('window 32'), { atMost: 0.15, unit: '' });
 });
