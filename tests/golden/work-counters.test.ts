@@ -104,7 +104,7 @@ for (const [name, options] of CONFIGURATIONS) {
 }
 
 /** Scenes of every kind that frames are made of. */
-const SCENES: Readonly<Record<string, (device: GPUDevice) => Promise<GaussianScene>>> = {
+const SCENES: Readonly<Record<string, (device: GPUDevice) => Promise<GaussianScene & { destroy(): void }>>> = {
   'a file': (device) => GaussianBuffers.upload(device, packGaussians(thinned(room(), 4000).cloud)),
   'levels of detail': (device) => GaussianBuffers.upload(device, packWithDetail(pebbles(4000))),
   'a streamed scene': (device) => {
@@ -129,12 +129,18 @@ const SCENES: Readonly<Record<string, (device: GPUDevice) => Promise<GaussianSce
   },
 };
 
+/** A device that counts, for all kinds of scenes: pipelines are made once. */
+const counted = (async () => {
+  const device = await (await requestNodeAdapter()).requestDevice();
+  return { device, counter: countWork(device) };
+})();
+
 for (const [name, options] of CONFIGURATIONS) {
   for (const [kind, open] of Object.entries(SCENES)) {
     test(`frames of ${kind} with ${name}: the CPU knows the size of every dispatch and draw`, async () => {
-      const device = await (await requestNodeAdapter()).requestDevice();
-      const counter = countWork(device);
+      const { device, counter } = await counted;
       const gaussians = await open(device);
+      counter.take();
       const renderer = new Renderer(device, { ...options, splatBudget: 3000 });
       const target = device.createTexture({ size: [64, 48], format: 'rgba8unorm', usage: 0x10 });
       // At rest an order of all splats is kept; turning, those that are visible are sorted.
@@ -147,7 +153,7 @@ for (const [name, options] of CONFIGURATIONS) {
       assert.ok(dispatches > 30);
       assert.equal(indirectCalls, 0);
       assert.ok((await renderer.statistics()).visible > 100, 'something is drawn');
-      renderer.destroy();
+      [renderer, gaussians, target].forEach((owner) => owner.destroy());
     });
   }
 }
