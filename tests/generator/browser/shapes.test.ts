@@ -90,13 +90,6 @@ describe('what models take, told to the page', () => {
     slider.value = '0.75';
     slider.dispatchEvent(new Event('input'));
     assertEqual(element.controls, { push: [0.75] });
-    element.controls = { push: 0.5 };
-    part('controls-panel')!.dispatchEvent(new PointerEvent('pointerenter'));
-    assertEqual(slider.value, '0.5', 'what the page has set');
-    element.controls = null;
-    element.setAttribute('control-push', '1');
-    await until(() => slider.value === '1', 'the value of an attribute');
-    element.removeAttribute('control-push');
     part('controls-panel')!.querySelector('button')!.click();
     assertEqual(element.controls, null);
     element.src = `${FIXTURES}shaped.onnx`;

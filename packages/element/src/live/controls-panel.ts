@@ -60,8 +60,6 @@ export class ControlsPanel {
   readonly #box: HTMLElement;
   /** Rotations of joints as people turn them, axis-angle, by the name of the input. */
   readonly #turns = new Map<string, number[]>();
-  /** Show what the page has set meanwhile, one for each control. */
-  #refreshers: (() => void)[] = [];
   #told = '';
 
   private constructor(element: PanelHost) {
@@ -76,9 +74,7 @@ export class ControlsPanel {
     element.addEventListener('inputs-change', () => this.#update());
     element.addEventListener('timeupdate', () => this.#showTime());
     element.addEventListener('emptied', () => this.#update());
-    // A page may set controls and poses itself: as attributes, which are noticed, or by properties, which are looked up before anybody turns a control.
-    new MutationObserver(() => this.#update()).observe(element, { attributes: true });
-    for (const type of ['pointerenter', 'focusin']) this.#box.addEventListener(type, () => this.#refresh());
+    new MutationObserver(() => this.#update()).observe(element, { attributeFilter: ['controls-panel'] });
   }
 
   /** The panel of an element: made at the first call. */
@@ -93,11 +89,9 @@ export class ControlsPanel {
     const { inputs, controlsPanel } = this.#element;
     this.#box.hidden = !controlsPanel || inputs.length === 0;
     const told = JSON.stringify(inputs);
-    if (this.#box.hidden) return;
-    if (told === this.#told) return this.#refresh();
+    if (told === this.#told || this.#box.hidden) return;
     this.#told = told;
     this.#turns.clear();
-    this.#refreshers = [];
     const controls = inputs.flatMap((input) => this.#controlsOf(input));
     const title = this.#word('controls-panel');
     this.#box.setAttribute('aria-label', title);
@@ -110,10 +104,6 @@ export class ControlsPanel {
     details.append(summary, ...controls, reset);
     this.#box.replaceChildren(details);
     this.#box.hidden = controls.length === 0;
-  }
-
-  #refresh(): void {
-    for (const refresh of this.#refreshers) refresh();
   }
 
   #controlsOf(input: GeneratorInput): HTMLElement[] {
@@ -129,13 +119,11 @@ export class ControlsPanel {
     return Array.from({ length: Math.min(size, MOST_SLIDERS) }, (_, i) => {
       const title = names?.[i] ?? (size > 1 ? `${label} ${i + 1}` : label);
       const now = (): readonly number[] => this.#valuesOf(name) ?? initial;
-      const control = slider(title, range, step, now()[i] ?? now()[0], (value) => {
+      return slider(title, range, step, now()[i] ?? now()[0], (value) => {
         const values = Array.from({ length: size }, (__, k) => now()[k] ?? now()[0]);
         values[i] = value;
         this.#set(name, values);
       });
-      this.#refreshers.push(() => showValue(control, now()[i] ?? now()[0]));
-      return control;
     });
   }
 
@@ -168,14 +156,9 @@ export class ControlsPanel {
         this.#element.pose = poseOf(turns, input);
       }),
     );
-    const showTurns = (): void => axes.forEach((axis, k) => showValue(axis, turns[3 * Number(choice.value) + k]));
-    choice.addEventListener('change', showTurns);
-    this.#refreshers.push(() => {
-      const set = format === 'axis-angle' ? readNumbers(this.#element.pose) : undefined;
-      if (set?.length !== turns.length) return;
-      turns.splice(0, turns.length, ...set);
-      showTurns();
-    });
+    choice.addEventListener('change', () =>
+      axes.forEach((axis, k) => showValue(axis, turns[3 * Number(choice.value) + k])),
+    );
     return [labelled(this.#word('controls-joint'), choice), ...axes];
   }
 
