@@ -28,6 +28,7 @@ export class Object3D {
   readonly scale: Vector3;
   add(object: Object3D): this;
   remove(object: Object3D): this;
+  removeFromParent(): this;
   lookAt(x: number, y: number, z: number): void;
   type: string;
   visible: boolean;

@@ -76,6 +76,32 @@ describe('meshes', () => {
     assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METRE, 50)), 'turned to its edge');
   });
 
+  it('are in pictures of toBlob(), over a colour and over nothing, and hide splats there', async () => {
+    const element = place({ src: GREEN });
+    element.append(mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' }));
+    await element.ready;
+    await frames();
+    const pixels = async (options: Parameters<typeof element.toBlob>[0]) => {
+      const bitmap = await createImageBitmap(await element.toBlob(options));
+      const { width, height } = bitmap;
+      const context = new OffscreenCanvas(width, height).getContext('2d')!;
+      context.drawImage(bitmap, 0, 0);
+      const at = (x: number, y: number): number[] => [...context.getImageData(x * width, y * height, 1, 1).data];
+      return { middle: at(0.5, 0.5), corner: at(0.05, 0.05), size: [width, height] };
+    };
+    for (const size of [{}, { width: 240, height: 200 }]) {
+      const clear = await pixels(size);
+      assertEqual(clear.corner, [0, 0, 0, 0], 'nothing behind');
+      const blue = await pixels({ ...size, background: 'rgb(0 0 255)' });
+      assertEqual(blue.corner, [0, 0, 255, 255], 'the colour behind');
+      assert(isRed(blue.middle as unknown as Rgb), `the mesh over it: ${blue.middle.join()}`);
+      assertEqual(blue.middle, clear.middle, 'what is opaque is the same over both');
+      if ('width' in size) assertEqual(blue.size, [240, 200], 'size');
+    }
+    const screen = await screenOf(element);
+    assert(isRed(screen.at(60, 50)), 'and the frame on the page is as before');
+  });
+
   it('alone, without splats, and with a scene that comes later', async () => {
     const element = place();
     element.append(mesh({ half: [1, 0.5, 0.5] }, { position: '0 1 0' }));

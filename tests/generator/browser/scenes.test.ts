@@ -1,4 +1,4 @@
-/** A generator, a file, a sequence and a mesh in one element: added, moved, played and removed, with devices that go; nothing is wrong and nothing stays. */
+/** A generator, a file, a sequence, a streamed scene and a mesh in one element: added, moved, played and removed, with devices that go; nothing is wrong and nothing stays. */
 import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
@@ -15,6 +15,8 @@ import {
   until,
 } from '../../element/browser/support/harness.js';
 import { screenOf } from '../../element/browser/support/screen.js';
+import { detailFolder } from '../../support/detail-folder.js';
+import { pebbles } from '../../support/scenes/pebbles.js';
 import { isLab } from '../../support/extent-in-pages.js';
 import { FIXTURES } from './support.js';
 
@@ -30,6 +32,16 @@ const scene = (src: string, position: string): SplatSceneElement => {
   child.setAttribute('position', position);
   return child;
 };
+
+/** A folder of pages. @returns the address of its manifest */
+async function serveStreamed(): Promise<string> {
+  const { files, manifest } = detailFolder(pebbles(6_000));
+  const put = (name: string, body: BodyInit): Promise<unknown> =>
+    fetch(`/net/kept/composed/${name}`, { method: 'PUT', body });
+  await Promise.all([...files].map(([name, bytes]) => put(name, bytes)));
+  await put('detail.json', JSON.stringify(manifest));
+  return '/net/kept/composed/detail.json';
+}
 
 describe('generators among other scenes', () => {
   it('play, move, come and go, and come back after losses', async () => {
@@ -49,11 +61,21 @@ describe('generators among other scenes', () => {
       const box = document.createElement('splat-mesh') as SplatMeshElement;
       box.src = boxGlb({ moves: 2, half: [0.4, 0.4, 0.4] });
       box.position = [0, 2.5, 0];
-      element.append(generator, movie, box);
+      const streamed = scene(await serveStreamed(), '-3 -4 0');
+      streamed.scale = 0.2;
+      element.append(generator, movie, box, streamed);
       await element.ready;
-      for (const child of [generator, movie, box]) assert(child.loaded, child.error?.message ?? child.localName);
+      for (const child of [generator, movie, box, streamed])
+        assert(child.loaded, child.error?.message ?? child.localName);
       assert(Number.isFinite(movie.duration) && !Number.isNaN(generator.duration), 'both have a time');
-      const still = await screenOf(element);
+      // Until the pages of the streamed one are all there.
+      let still = await screenOf(element);
+      for (let changed = Infinity; changed > 0;) {
+        await frames(20);
+        const next = await screenOf(element);
+        changed = next.differences(still, 3);
+        still = next;
+      }
       element.loop = true;
       await element.play();
       const end = performance.now() + PLAYS_MS;
@@ -85,7 +107,7 @@ describe('generators among other scenes', () => {
       }, 'the picture of the beginning');
       element.append(scene(`${SCENES}green.splat`, '0 -2 0'));
       await element.ready;
-      assertEqual(element.stats?.scenes.length, 5, 'the own scene and four children');
+      assertEqual(element.stats?.scenes.length, 6, 'the own scene and five children');
     } finally {
       document.body.replaceChildren();
       await until(() => holdings().objects === 0, 'the memory to be given back');

@@ -1,8 +1,17 @@
 /** Shapes and roles of real models on the GPU; a model that goes on from what it wrote; what the element tells of inputs, and its panel. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
+import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 import { Generator } from '@gaussian-splat/generator';
-import { assert, assertEqual, COMPASS, show, showLoaded, until } from '../../element/browser/support/harness.js';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from '../../element/browser/support/harness.js';
 import { CAMERA, FIXTURES, makeDevice, numbersOf, ReadingSink, relativeError, runOnCpu } from './support.js';
 
 GaussianSplatElement.runtimeLocation = '/node_modules/onnxruntime-web/dist/';
@@ -105,5 +114,29 @@ describe('what models take, told to the page', () => {
     );
     element.removeAttribute('controls-panel');
     await until(() => part('controls-panel')!.hidden === true, 'no panel');
+  });
+
+  it('the same of a generator in a child: its own inputs, and a group of the panel', async () => {
+    const element = await showLoaded({ src: COMPASS, 'controls-panel': '' });
+    const child = document.createElement('splat-scene') as SplatSceneElement;
+    child.title = 'Ball';
+    child.setAttribute('src', `${FIXTURES}state.onnx`);
+    const told = nextEvent(child, 'inputs-change');
+    element.append(child);
+    await told;
+    assertEqual([child.inputs.map(({ name }) => name).includes('push'), element.inputs.length], [true, 0]);
+    const group = (): HTMLElement | null => element.shadowRoot!.querySelector('[part=controls-scene]');
+    await until(() => group() !== null, 'its group');
+    assertEqual(group()!.querySelector('legend')!.textContent, 'Ball');
+    const slider = group()!.querySelector<HTMLInputElement>('input[type=range]')!;
+    slider.value = '0.75';
+    slider.dispatchEvent(new Event('input'));
+    assertEqual([child.controls, element.controls], [{ push: [0.75] }, null]);
+    element.shadowRoot!.querySelector<HTMLElement>('[part=controls-panel] button')!.click();
+    assertEqual(child.controls, null);
+    child.remove();
+    const panel = element.shadowRoot!.querySelector<HTMLElement>('[part=controls-panel]')!;
+    await until(() => panel.hidden === true, 'no panel');
+    assertEqual(child.inputs, []);
   });
 });

@@ -9,7 +9,8 @@ import {
   World,
   type RasterizerName,
 } from '@gaussian-splat/renderer';
-import { SplatRenderer, SplatScene } from '@gaussian-splat/three';
+import { GaussianModels } from '@gaussian-splat/generator';
+import { GeneratedSplats, SplatRenderer, SplatScene } from '@gaussian-splat/three';
 import {
   BoxGeometry,
   Color,
@@ -22,6 +23,7 @@ import {
 } from 'three/webgpu';
 import { assert } from '../../element/browser/support/harness.js';
 import { isLab } from '../../support/extent-in-pages.js';
+import { FIXTURES as GENERATORS } from '../../generator/browser/support.js';
 
 const [WIDTH, HEIGHT] = [192, 128];
 const BACKGROUND = [0.1, 0.3, 0.2] as const;
@@ -157,6 +159,53 @@ describe('splats in a three.js scene', () => {
       canvas.remove();
     });
   }
+
+  it('a model by name: its splats stand in the scene, as its last run has written them', async () => {
+    const { renderer, canvas } = await renderer3();
+    const device = renderer.backend.device!;
+    const models = new GaussianModels();
+    models.registerGaussianGenerator('ball', { url: `${GENERATORS}packed.onnx` });
+    await models.loadAllGenerators(device);
+    const how = settings('default', { rasterizer: 'quads' });
+    const splats = new SplatRenderer(renderer, { settings: how });
+    const scene = new Scene();
+    scene.background = new Color().setRGB(...BACKGROUND, 'srgb');
+    const camera = new PerspectiveCamera(50, WIDTH / HEIGHT, 0.1, 100);
+    camera.position.set(0, 0, 6);
+    const draw = (): Uint8ClampedArray => {
+      for (let k = 0; k < FRAMES; k++) splats.render(scene, camera);
+      return shown(canvas);
+    };
+    const nothing = draw();
+    const model = await models.addGaussianModelToScene('ball', (layout) => GeneratedSplats.create(device, layout));
+    const ball = model.gaussians;
+    scene.add(ball);
+    assert(worst(draw(), nothing) === 0, 'nothing before the first run');
+    models.runGenerators({ timeSeconds: 1 });
+    await model.generator.idle;
+    const first = draw();
+    assert(worst(first, nothing) > 40, `the ball is seen: ${worst(first, nothing)}`);
+    const twin = new SplatScene(ball.gaussians);
+    scene.remove(ball);
+    scene.add(twin);
+    assert(worst(draw(), first) === 0, 'as its Gaussians are drawn by themselves');
+    scene.remove(twin);
+    scene.add(ball);
+    ball.position.set(1, 0, 0);
+    assert(worst(draw(), first) > 40, 'its matrix moves it');
+    ball.position.set(0, 0, 0);
+    const before = ball.version;
+    models.runGenerators({ timeSeconds: 2 });
+    await model.generator.idle;
+    assert(ball.version === before + 1, 'another run is taken in');
+    model.remove();
+    ball.dispose();
+    assert(worst(draw(), nothing) === 0, 'gone from the graph, gone from the picture');
+    models.clear();
+    splats.dispose();
+    renderer.dispose();
+    canvas.remove();
+  });
 
   it('names what a renderer lacks', () => {
     let code = '';

@@ -8,6 +8,7 @@ import { SourceController, type SourceHost } from '../controllers/source-control
 import type { ElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { GeneratorInput } from '../live/inputs.js';
 import { LiveWiring, type LiveHost } from '../live/live-wiring.js';
 import type { ProgressListener } from '../loading/protocol.js';
 import type { Services } from '../stage-host.js';
@@ -99,6 +100,10 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   get stats(): PartStats {
     const { state, error, scene } = this.scene;
     return { element: this.element, state, error, ...costOf(scene) };
+  }
+
+  get inputs(): readonly GeneratorInput[] {
+    return this.member?.scene.live?.inputs ?? [];
   }
 
   get owner(): Element | null {
@@ -251,6 +256,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
       this.member?.remove();
       this.member = member;
       this.place();
+      this.#live.tellInputs(this.inputs);
     });
   }
 
@@ -265,6 +271,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   leave(): void {
     this.member?.remove();
     this.member = undefined;
+    this.#live.tellInputs(this.inputs);
   }
 
   previewShown({ gaussians }: LoadedGaussians): void {

@@ -1,6 +1,7 @@
 import type { PropertyDeclarations } from 'lit';
 import type { Source } from '../stage-host.js';
 import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../live/values.js';
+import type { GeneratorInput } from '../live/inputs.js';
 import type { LiveState } from '../live/live-model.js';
 import { SCENE_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
@@ -21,6 +22,7 @@ type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
  * @fires {CustomEvent<LoadDetail>} load - It is shown.
  * @fires {ProgressEvent} progress - Bytes have arrived.
  * @fires {CustomEvent<ElementError>} error - It cannot be shown; `detail` is the same object as the property `error`. The others stay.
+ * @fires {Event} inputs-change - The inputs that the page may set are others; `inputs` has them.
  * @fires {CustomEvent<ElementError>} generator-error - A run of its generator failed; the last good frame stays.
  * @fires {Event} play - As of HTMLMediaElement: its own clock runs.
  * @fires {Event} pause - Its own clock stands still.
@@ -47,6 +49,11 @@ export class SplatSceneElement extends SplatChild {
   protected readonly table = SCENE_ATTRIBUTES;
   #liveValues: Omit<LiveState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;
+
+  /** What the page may set of its generators, as of `<gaussian-splat>`; `inputs-change` tells of others. */
+  get inputs(): readonly GeneratorInput[] {
+    return this.holder.inputs;
+  }
 
   /** @internal */
   override get liveValues(): Omit<LiveState, 'timeSeconds'> {

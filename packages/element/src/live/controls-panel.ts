@@ -10,6 +10,7 @@ export const PANEL_WORDS = {
   'controls-reset': 'Reset',
   'controls-time': 'Time',
   'controls-joint': 'Joint',
+  'controls-scene': 'Scene',
 } as const;
 
 /** Numbers of one input that get a slider each; more are a page's own business. */
@@ -35,20 +36,26 @@ const STYLE = `
     font: var(--message-font, 0.875rem/1.4 system-ui, sans-serif);
   }
   [part='controls-panel'] summary { cursor: pointer; min-block-size: 24px; }
+  [part='controls-scene'] { margin: 0.5em 0 0; padding: 0; border: 0; min-inline-size: 0; }
+  [part='controls-scene'] legend { padding: 0; font-weight: 600; }
   [part='control'] { display: grid; grid-template-columns: 1fr auto; gap: 0 0.5em; margin-block: 0.4em; }
   [part='control-input'] { grid-column: 1 / -1; inline-size: 100%; min-block-size: 24px; box-sizing: border-box; }
   [part='control-value'] { font-variant-numeric: tabular-nums; }
 `;
 
-/** What the panel sees of its element. */
-interface PanelHost extends HTMLElement {
+/** Whose inputs are set: the element, or a `<splat-scene>` in it. */
+interface Owner extends HTMLElement {
   readonly inputs: readonly GeneratorInput[];
+  controls: ControlValues | null;
+  pose: Numbers | null;
+}
+
+/** What the panel sees of its element. */
+interface PanelHost extends Owner {
   readonly controlsPanel: boolean;
   readonly a11y: unknown;
   readonly duration: number;
   currentTime: number;
-  controls: ControlValues | null;
-  pose: Numbers | null;
 }
 
 const panels = new WeakMap<PanelHost, ControlsPanel>();
@@ -58,8 +65,8 @@ export class ControlsPanel {
   readonly #element: PanelHost;
   readonly #strings: SpokenStrings;
   readonly #box: HTMLElement;
-  /** Rotations of joints as people turn them, axis-angle, by the name of the input. */
-  readonly #turns = new Map<string, number[]>();
+  /** Those with rotations of joints, which people turn as axis-angle. */
+  readonly #turned = new Set<Owner>();
   #told = '';
 
   private constructor(element: PanelHost) {
@@ -86,13 +93,18 @@ export class ControlsPanel {
 
   /** Builds the controls anew where there are others than before. */
   #update(): void {
-    const { inputs, controlsPanel } = this.#element;
-    this.#box.hidden = !controlsPanel || inputs.length === 0;
-    const told = JSON.stringify(inputs);
+    const owners = this.#owners;
+    this.#box.hidden = !this.#element.controlsPanel || owners.length === 0;
+    const told = JSON.stringify(owners.map((owner) => [this.#titleOf(owner), owner.inputs]));
     if (told === this.#told || this.#box.hidden) return;
     this.#told = told;
-    this.#turns.clear();
-    const controls = inputs.flatMap((input) => this.#controlsOf(input));
+    this.#turned.clear();
+    const controls = owners.flatMap((owner) => {
+      const own = owner.inputs.flatMap((input) => this.#controlsOf(owner, input));
+      return owner === this.#element || own.length === 0 ? own : [this.#group(owner, own)];
+    });
+    const takesTime = owners.some(({ inputs }) => inputs.some(({ role }) => role === 'time'));
+    if (takesTime && Number.isFinite(this.#element.duration)) controls.unshift(this.#time());
     const title = this.#word('controls-panel');
     this.#box.setAttribute('aria-label', title);
     if (Object.keys(this.#strings).length === 0) this.#box.lang = 'en';
@@ -106,44 +118,62 @@ export class ControlsPanel {
     this.#box.hidden = controls.length === 0;
   }
 
-  #controlsOf(input: GeneratorInput): HTMLElement[] {
-    if (SLIDES.includes(input.role)) return this.#sliders(input);
-    if (input.role === 'image') return [this.#picture(input)];
-    if (input.role === 'pose') return this.#pose(input);
-    return input.role === 'time' && Number.isFinite(this.#element.duration) ? [this.#time()] : [];
+  /** The element and its children, as far as they have inputs. */
+  get #owners(): readonly Owner[] {
+    const children = [...this.#element.children] as Element[] as Owner[];
+    return [this.#element, ...children].filter(({ inputs = [] }) => inputs.length > 0);
   }
 
-  #sliders(input: GeneratorInput): HTMLElement[] {
+  /** What a child is called: by its title or id, or else by its number. */
+  #titleOf(owner: Owner): string {
+    return (
+      owner.title || owner.id || `${this.#word('controls-scene')} ${[...this.#element.children].indexOf(owner) + 1}`
+    );
+  }
+
+  #group(owner: Owner, controls: readonly HTMLElement[]): HTMLElement {
+    const group = make('fieldset', { part: 'controls-scene' });
+    group.append(make('legend', { textContent: this.#titleOf(owner) }), ...controls);
+    return group;
+  }
+
+  #controlsOf(owner: Owner, input: GeneratorInput): HTMLElement[] {
+    if (SLIDES.includes(input.role)) return this.#sliders(owner, input);
+    if (input.role === 'image') return [this.#picture(owner, input)];
+    return input.role === 'pose' ? this.#pose(owner, input) : [];
+  }
+
+  #sliders(owner: Owner, input: GeneratorInput): HTMLElement[] {
     const { name, label, size, range = SHAPE_RANGE, step = (range[1] - range[0]) / SLIDER_STEPS, names } = input;
     const initial = numbersOf(input);
     return Array.from({ length: Math.min(size, MOST_SLIDERS) }, (_, i) => {
       const title = names?.[i] ?? (size > 1 ? `${label} ${i + 1}` : label);
-      const now = (): readonly number[] => this.#valuesOf(name) ?? initial;
+      const now = (): readonly number[] => valuesOf(owner, name) ?? initial;
       return slider(title, range, step, now()[i] ?? now()[0], (value) => {
         const values = Array.from({ length: size }, (__, k) => now()[k] ?? now()[0]);
         values[i] = value;
-        this.#set(name, values);
+        set(owner, name, values);
       });
     });
   }
 
-  #picture({ name, label, views = 1 }: GeneratorInput): HTMLElement {
+  #picture(owner: Owner, { name, label, views = 1 }: GeneratorInput): HTMLElement {
     const field = make('input', { type: 'file', accept: 'image/*', multiple: views > 1, part: 'control-input' });
     field.addEventListener('change', () => {
       const files = [...(field.files ?? [])].slice(0, views);
-      if (files.length === views) this.#set(name, views > 1 ? files : files[0]);
+      if (files.length === views) set(owner, name, views > 1 ? files : files[0]);
     });
     return labelled(label, field);
   }
 
   /** A joint is chosen, and turned around its three axes. */
-  #pose(input: GeneratorInput): HTMLElement[] {
-    const { name, format = 'parameters', joints, size } = input;
+  #pose(owner: Owner, input: GeneratorInput): HTMLElement[] {
+    const { format = 'parameters', joints, size } = input;
     const perJoint = { 'axis-angle': 3, quaternion: 4, matrix: 9, parameters: 0 }[format];
     if (perJoint === 0) return [];
     const count = size / perJoint;
     const turns = new Array<number>(3 * count).fill(0);
-    this.#turns.set(name, turns);
+    this.#turned.add(owner);
     const choice = make('select', { part: 'control-input' });
     choice.append(
       ...Array.from({ length: count }, (_, i) =>
@@ -153,7 +183,7 @@ export class ControlsPanel {
     const axes = ['x', 'y', 'z'].map((axis, k) =>
       slider(axis, [-Math.PI, Math.PI], Math.PI / SLIDER_STEPS, 0, (value) => {
         turns[3 * Number(choice.value) + k] = value;
-        this.#element.pose = poseOf(turns, input);
+        owner.pose = poseOf(turns, input);
       }),
     );
     choice.addEventListener('change', () =>
@@ -177,29 +207,30 @@ export class ControlsPanel {
   }
 
   #reset(): void {
-    const { controls } = this.#element;
-    const names = this.#element.inputs.map(({ name }) => name);
-    const others = Object.entries(controls ?? {}).filter(([name]) => !names.includes(name));
-    this.#element.controls = others.length > 0 ? Object.fromEntries(others) : null;
-    if (this.#turns.size > 0) this.#element.pose = null;
+    for (const owner of this.#owners) {
+      const names = owner.inputs.map(({ name }) => name);
+      const others = Object.entries(owner.controls ?? {}).filter(([name]) => !names.includes(name));
+      owner.controls = others.length > 0 ? Object.fromEntries(others) : null;
+      if (this.#turned.has(owner)) owner.pose = null;
+    }
     this.#told = '';
     this.#update();
     this.#box.querySelector('summary')?.focus();
   }
 
-  /** What the page has set of an input. */
-  #valuesOf(name: string): readonly number[] | undefined {
-    const set = valueOf(this.#element.controls ?? {}, name);
-    return readNumbers((set as Numbers | undefined) ?? this.#element.getAttribute(`control-${name.toLowerCase()}`));
-  }
-
-  #set(name: string, value: ControlValues[string]): void {
-    this.#element.controls = { ...this.#element.controls, [name]: value };
-  }
-
   #word(key: keyof typeof PANEL_WORDS): string {
     return (this.#strings as Readonly<Record<string, string | undefined>>)[key] ?? PANEL_WORDS[key];
   }
+}
+
+/** What the page has set of an input. */
+function valuesOf(owner: Owner, name: string): readonly number[] | undefined {
+  const found = valueOf(owner.controls ?? {}, name);
+  return readNumbers((found as Numbers | undefined) ?? owner.getAttribute(`control-${name.toLowerCase()}`));
+}
+
+function set(owner: Owner, name: string, value: ControlValues[string]): void {
+  owner.controls = { ...owner.controls, [name]: value };
 }
 
 /** All numbers of an input where nothing is set. */

@@ -13,18 +13,29 @@ export const compareOf = ({
 }: Pick<LiveRequest, 'element' | 'loader'>): false | LiveRequest['loader']['spawn'] =>
   ((element as ModelElement).compare ?? element.getAttribute('compare'))?.trim() === 'off' ? false : loader.spawn;
 
+const ownerOf = (element: HTMLElement): ModelElement | null =>
+  'controlsPanel' in element ? (element as ModelElement) : element.parentElement;
+
 const offered = new WeakSet<HTMLElement>();
 
-/** From now on the element has a panel of controls whenever its attribute asks for one. */
+/** From now on the element, or for a child the one around it, has a panel of controls whenever its attribute asks for one. */
 export function offerPanel(element: HTMLElement): void {
   if (offered.has(element)) return;
   offered.add(element);
+  // A child may be moved to another element, and has none when it is taken away.
+  let last: ModelElement | null = null;
   const show = async (): Promise<void> => {
-    if (!(element as ModelElement).controlsPanel) return;
-    const { ControlsPanel } = await import('./controls-panel.js');
-    ControlsPanel.show(element as Parameters<typeof ControlsPanel.show>[0]);
+    const owner = ownerOf(element);
+    const hosts = new Set([last, owner]);
+    last = owner;
+    for (const host of hosts) {
+      if (!host?.controlsPanel) continue;
+      const { ControlsPanel } = await import('./controls-panel.js');
+      ControlsPanel.show(host as Parameters<typeof ControlsPanel.show>[0]);
+    }
   };
   const showOrTell = (): void => void show().catch((error: unknown) => console.warn('<gaussian-splat>:', error));
   element.addEventListener('inputs-change', showOrTell);
-  new MutationObserver(showOrTell).observe(element, { attributeFilter: ['controls-panel'] });
+  const owner = ownerOf(element);
+  if (owner) new MutationObserver(showOrTell).observe(owner, { attributeFilter: ['controls-panel'] });
 }

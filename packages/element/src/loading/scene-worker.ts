@@ -162,6 +162,15 @@ function serve(scope: WorkerScope): void {
     else void run(data.id, data);
   });
   scope.postMessage({ type: 'ready' });
+  holdLock((lock) => scope.postMessage({ type: 'lives', lock }));
+}
+
+/** A lock falls free when its thread ends, however busy that was and whatever ended it: browsers tell pages of it in no other way. */
+function holdLock(onHeld: (name: string) => void): void {
+  // Pages of no origin, such as sandboxed frames, have no locks.
+  const { locks } = navigator as { locks?: LockManager };
+  const name = `gaussian-splat ${Math.random()}`;
+  locks?.request(name, () => (onHeld(name), new Promise(() => undefined))).catch(() => undefined);
 }
 
 const isWorker = typeof document === 'undefined' && 'WorkerGlobalScope' in globalThis;
