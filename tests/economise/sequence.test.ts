@@ -102,6 +102,6 @@ test('frames are as near to the scene files as it says', { timeout: 400_000 }, a
 test('frames of other splats are refused', { timeout: 400_000 }, () => {
   const { status, said } = command('mixed.json', '--out', 'none', '--min-db', '40');
   assert.equal(status, 1, said);
-  assert.match(said, /expected 600 splats in each/);
+  assert.match(said, /expected 600 splats in each frame/);
   assert.ok(!readdirSync(folder).includes('none'), 'nothing was written');
 });

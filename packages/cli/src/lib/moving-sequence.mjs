@@ -1,5 +1,5 @@
 /** A sequence whose splats correspond as a scene and what moves in it: how coarse that may be is measured in images of some frames. */
-import { boundsOf } from '@gaussian-splat/core';
+import { boundsOf, GaussianSplatError } from '@gaussian-splat/core';
 import {
   allocateSteps,
   encodingsFor,
@@ -113,7 +113,16 @@ export async function codeSequence({ frameCount, openFrame, framesPerFile, minDe
   const source = await openFrame(0);
   const order = packedOrder(source);
   // As the file of the first has them: neighbours are next to one another there, and move alike.
-  const openOrdered = async (frame) => splatsOf(await openFrame(frame), order);
+  const openOrdered = async (frame) => {
+    const cloud = await openFrame(frame);
+    if (cloud.count === source.count) return splatsOf(cloud, order);
+    throw new GaussianSplatError('argument/value', {
+      where: `frame ${frame}`,
+      expected: `${source.count} splats in each frame, the same ones in the same order`,
+      found: `${cloud.count}`,
+      remedy: 'keep scene files for such frames',
+    });
+  };
   const { bytes: firstBytes, cloud: first } = await codeFirst(source, device, FIRST_SHARE * target);
   onStep(`first frame: ${firstBytes.length} bytes`);
   const groupAt = async (begin) => {
