@@ -1,5 +1,5 @@
 /** Labels and views that a visitor puts into the scene: children of the element, rows of a list, and lines of HTML. */
-import { elementOf, escape } from './html.js';
+import { buttonOf } from './html.js';
 
 export class Children {
   #scene;
@@ -35,11 +35,7 @@ export class Children {
 
   /** One line of HTML for each. */
   get html() {
-    return this.#items.map(({ child, attributes }) =>
-      elementOf('button', attributes)
-        .replace('></button>', `>${escape(child.textContent)}</button>`)
-        .replaceAll('\n', ''),
-    );
+    return this.#items.map(({ child, attributes }) => buttonOf(attributes, child.textContent));
   }
 
   clear() {

@@ -24,18 +24,15 @@ export function frameOf(cdn, attributes) {
  * @param children {readonly string[]} HTML of labels and views
  */
 export function sceneOf(attributes, children) {
-  return elementOf('gaussian-splat', [...attributes, ['style', STYLE]], children);
+  const content = children.map((child) => `\n  ${child}`).join('');
+  return `<gaussian-splat\n  ${partsOf([...attributes, ['style', STYLE]]).join('\n  ')}\n>${content}${content && '\n'}</gaussian-splat>`;
 }
 
-/** @returns {string} an element, on one line or, if that grows long, an attribute on each. */
-export function elementOf(tag, attributes, children = []) {
-  const parts = attributes.map(([name, value]) => (value === true ? name : `${name}="${escape(value)}"`));
-  const content = children.map((child) => `\n  ${child}`).join('');
-  const line = `<${tag} ${parts.join(' ')}>${content}${content && '\n'}</${tag}>`;
-  return line.length - content.length <= 90
-    ? line
-    : `<${tag}\n  ${parts.join('\n  ')}\n>${content}${content && '\n'}</${tag}>`;
-}
+/** A label or a view. */
+export const buttonOf = (attributes, text) => `<button ${partsOf(attributes).join(' ')}>${escape(text)}</button>`;
+
+const partsOf = (attributes) =>
+  attributes.map(([name, value]) => (value === true ? name : `${name}="${escape(value)}"`));
 
 /** A whole page with a scene. */
 export function pageOf(script, scene, title) {
@@ -55,6 +52,6 @@ ${scene}
 `;
 }
 
-export function escape(value) {
+function escape(value) {
   return value.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
 }

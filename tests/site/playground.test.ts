@@ -133,7 +133,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.click('#reset');
     assert.match(
       (await tab.locator('#html').textContent())!,
-      /scenes\/skull\.spz"\s+alt="A skull"\s+camera-controls\s*>/,
+      /scenes\/skull\.spz"\s+alt="A skull"\s+camera-controls\s+style="[^"]+"\s*>/,
     );
     assert.deepEqual(faults, []);
   });
