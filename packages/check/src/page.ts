@@ -13,7 +13,7 @@ import type { Outputs, SampleInputs } from './run-instances.js';
 import { runModel, type RunReport, type Runtime } from './run-samples.js';
 
 export interface PageRun extends RunReport {
-  /** How the model runs on the page's GPU, and why not there, for people. */
+  /** How the model runs on the page's GPU, and why not there, for readers. */
   readonly how: string;
 }
 

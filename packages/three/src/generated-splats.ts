@@ -39,7 +39,7 @@ export class GeneratedSplats extends SplatScene {
     this.#written.ingest(...run);
   }
 
-  /** Number of runs taken in so far, and one: a frame is due when it has grown. */
+  /** Number of runs taken in until now, and one: a frame is due when it has grown. */
   get version(): number {
     return this.#written.version;
   }

@@ -11,7 +11,7 @@ let fetching: Promise<void> | undefined;
 
 /** Fetches the law, once for all elements. Fulfils, and never rejects, when it is there or cannot be had. */
 export const fetchLaw = (): Promise<void> =>
-  (fetching ??= loadModule('the code that paces pictures', () => import('../pace/pace.js')).then(
+  (fetching ??= loadModule('the code that sets the quality while moving', () => import('../pace/pace.js')).then(
     (module) => {
       law = module;
     },

@@ -6,7 +6,7 @@ interface Told {
   readonly since: number;
 }
 
-/** Fulfils when all that was drawn so far is done. Rejects where the context is lost. */
+/** Fulfils when all that was drawn until now is done. Rejects where the context is lost. */
 export async function drawn(gl: WebGL2RenderingContext): Promise<Told> {
   const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();

@@ -36,7 +36,7 @@ export class GlGaussians {
   }
 
   /**
-   * Copies packed Gaussians to the GPU, so much at a time that the thread can do other things between.
+   * Copies packed Gaussians to the GPU, in parts, so that the thread can do other things between.
    * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures hold, `out-of-memory/allocation`
    */
   static async upload(gl: WebGL2RenderingContext, packed: PackedGaussians): Promise<GlGaussians> {
