@@ -20,7 +20,7 @@ from ..contract import Facts, normalized_time
 from ..errors import ExportError
 from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
-from ..pieces.mlp import Linear, beside, linear, mlp, stacked
+from ..pieces.mlp import Linear, beside, convolved, linear, mlp, rows_of, stacked
 from ..planes import sample_plane
 from .classic import Cloud, usable
 
@@ -56,10 +56,10 @@ def export_hexplane(
     options = options or Options()
     graph = Graph("hexplane", options.weights, options.instances is not None)
     time = graph.input("time", *graph.lead, 1)
-    first, *rest = deformation.trunk
-    hidden = linear(features(cloud, deformation, graph, time), first, "trunk_0", are_columns=True).unary("Relu")
-    for index, layer in enumerate(rest):
-        hidden = linear(hidden, layer, f"trunk_{index + 1}").unary("Relu")
+    columns = features(cloud, deformation, graph, time)
+    hidden = columns.reshape(1, *columns.shape, 1)
+    for index, layer in enumerate(deformation.trunk):
+        hidden = convolved(hidden, layer, f"trunk_{index}").unary("Relu")
     gaussians = move(cloud, deformation, hidden)
     return finish(graph, gaussians, [normalized_time()], reach(cloud, deformation), facts, options)
 
@@ -178,7 +178,7 @@ def share(size: int, of: int) -> float:
 
 
 def move(cloud: Cloud, deformation: Deformation, hidden: Tensor) -> Gaussians:
-    """The Gaussians where the heads put them. hidden (rows, W), after its ReLU."""
+    """The Gaussians where the heads put them. hidden (1, W, rows, 1), after its ReLU."""
     graph, count = hidden.graph, len(cloud.positions)
     at_rest = {
         "position": graph.constant(cloud.positions, "positions", errors="even"),
@@ -217,7 +217,7 @@ def moved(
     if graph.lead or deformation.mask is not None:
         changes = together(hidden, list(heads.values())).reshape(*graph.lead, count, total)
         if deformation.mask is not None:
-            mask = mlp(hidden, deformation.mask, "mask").reshape(*graph.lead, count, 1)
+            mask = mlp(rows_of(hidden), deformation.mask, "mask").reshape(*graph.lead, count, 1)
             # What turns is never masked.
             free = np.concatenate([np.full(size, name == "rotation", np.float32) for name, size in sizes.items()])
             rest = rest * (mask * graph.constant(1 - free, "masked") + graph.constant(free, "free"))
@@ -229,12 +229,15 @@ def moved(
 
 
 def together(hidden: Tensor, heads: Sequence[Sequence[Linear]], plus: Tensor | None = None) -> Tensor:
-    """Outputs (rows, sum of outputs) of several networks on the same rows, one after the other; `plus` is added."""
+    """Outputs (rows, sum of outputs) of several networks on the same columns (1, W, rows, 1), and `plus`."""
     if len({len(layers) for layers in heads}) > 1:
-        apart = hidden.graph.concat([mlp(hidden, layers, "head") for layers in heads], 1)
+        rows = rows_of(hidden)
+        apart = hidden.graph.concat([mlp(rows, layers, "head") for layers in heads], 1)
         return apart if plus is None else apart + plus
     first, *rest = zip(*heads, strict=True)
     one = [stacked(first), *(beside(layers) for layers in rest)]
     bias = hidden.graph.constant(one[-1].bias, "heads_bias")
-    x = mlp(hidden, one[:-1], "heads").unary("Relu") if len(one) > 1 else hidden
-    return linear(x, one[-1], "heads_end", None if plus is None else plus + bias)
+    x = hidden
+    for index, layer in enumerate(one[:-1]):
+        x = convolved(x, layer, f"heads_{index}").unary("Relu")
+    return linear(rows_of(x), one[-1], "heads_end", None if plus is None else plus + bias)

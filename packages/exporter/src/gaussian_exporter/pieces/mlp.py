@@ -28,20 +28,34 @@ class Linear:
         return int(self.weight.shape[0])
 
 
-def linear(x: Tensor, layer: Linear, name: str, plus: Tensor | None = None, are_columns: bool = False) -> Tensor:
-    """One layer on rows (..., in), or with `are_columns` on columns (in, rows), which saves turning them; gives rows.
-    `plus` (rows, out), constant or not, takes the place of the bias."""
+def linear(x: Tensor, layer: Linear, name: str, plus: Tensor | None = None) -> Tensor:
+    """One layer on rows (..., in). `plus` (rows, out), constant or not, takes the place of the bias."""
     graph = x.graph
-    if x.shape[0 if are_columns else -1] != layer.inputs:
+    if x.shape[-1] != layer.inputs:
         raise wrong_shape("Gemm", f"{layer.inputs} columns", str(x.shape))
     # As PyTorch stores it: the provider then reads four numbers at once whatever the number of outputs.
     weight = graph.constant(layer.weight, f"{name}_weight")
     added = graph.constant(layer.bias, f"{name}_bias") if plus is None else plus
-    if are_columns:
-        return graph.node("Gemm", [x, weight, added], (x.shape[1], layer.outputs), transA=1, transB=1)
     rows = x.reshape(prod(x.shape[:-1]), layer.inputs)
     result = graph.node("Gemm", [rows, weight, added], (rows.shape[0], layer.outputs), transB=1)
     return result.reshape(*x.shape[:-1], layer.outputs)
+
+
+def convolved(x: Tensor, layer: Linear, name: str) -> Tensor:
+    """One layer on columns (1, in, rows, 1) as a convolution of 1x1; gives (1, out, rows, 1). ONNX Runtime computes a
+    ReLU behind a convolution in the same dispatch, which it does not behind a Gemm: 0.43 ms in place of 0.65 for a 4DGS
+    of 60,000 Gaussians on an H100."""
+    graph = x.graph
+    if x.shape[1] != layer.inputs:
+        raise wrong_shape("Conv", f"{layer.inputs} channels", str(x.shape))
+    weight = graph.constant(layer.weight[..., None, None], f"{name}_weight")
+    bias = graph.constant(layer.bias, f"{name}_bias")
+    return graph.node("Conv", [x, weight, bias], (1, layer.outputs, *x.shape[2:]), kernel_shape=[1, 1])
+
+
+def rows_of(x: Tensor) -> Tensor:
+    """Columns (1, n, rows, 1) as rows (rows, n)."""
+    return x.transpose(0, 2, 3, 1).reshape(x.shape[2], x.shape[1])
 
 
 def mlp(x: Tensor, layers: Sequence[Linear], name: str, last: str | None = None) -> Tensor:
