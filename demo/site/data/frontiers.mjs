@@ -46,7 +46,7 @@ function firstOf(results, standard) {
   return rows.map(({ ms, psnr, ...row }) => ({
     ...row,
     milliseconds: ms < 10 ? ms.toPrecision(2) : Math.round(ms).toLocaleString('en'),
-    share: ((100 * ms) / most).toFixed(1),
+    share: (ms / most).toFixed(3),
     decibels: psnr.toFixed(0),
     eye: TO_THE_EYE.find(([least]) => psnr >= least)[1],
   }));
