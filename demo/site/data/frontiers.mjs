@@ -45,8 +45,8 @@ function firstOf(results, standard) {
   const most = Math.max(...rows.map(({ ms }) => ms));
   return rows.map(({ ms, psnr, ...row }) => ({
     ...row,
-    milliseconds: Number(ms.toPrecision(2)).toLocaleString('en'),
-    share: ((100 * ms) / most).toFixed(1),
+    milliseconds: ms < 10 ? ms.toPrecision(2) : Math.round(ms).toLocaleString('en'),
+    share: (ms / most).toFixed(3),
     decibels: psnr.toFixed(0),
     eye: TO_THE_EYE.find(([least]) => psnr >= least)[1],
   }));
