@@ -208,7 +208,8 @@ struct Walk {
 }
 
 fn find_next(walk: ptr<function, Walk>, own_block: u32) {
-  while ((*walk).ahead == 0u && (*walk).next_word < BATCH_WORDS) {
+  while ((*walk).next_word < BATCH_WORDS) {
+    if ((*walk).ahead != 0u) { break; }
     (*walk).ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + (*walk).next_word]);
     (*walk).next_word++;
   }

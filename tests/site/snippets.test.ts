@@ -196,7 +196,8 @@ describe('what documents tell people to write', { skip }, () => {
   it('HTML shows a picture', { timeout: 200_000 }, async () => {
     // Children of the element are opened by tests/element/browser/scenes.test.ts.
     const copied = snippets('html').filter(
-      ({ code }) => !code.includes('<splat-') && (isFull || !code.includes('.onnx')),
+      ({ code }) =>
+        code.includes('<gaussian-splat') && !code.includes('<splat-') && (isFull || !code.includes('.onnx')),
     );
     const all = [...copied, { place: 'gaussian-splat page', language: 'html', code: made.index }];
     assert.ok(all.length > 5, `${all.length} snippets`);

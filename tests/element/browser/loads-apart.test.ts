@@ -17,19 +17,13 @@ const original = GaussianSplatElement.sceneLoader;
 const Loader = original.constructor as new (spawn: () => Worker) => SceneLoader;
 
 const SCRIPT = new URL('/packages/element/dist/loading/scene-worker.js', location.href).href;
-/** Reads what is called `endless` for ever, with (`reads`) or without having said so, and dies of what is called `deadly`. */
+/** Reads what is called `endless` for ever, with (`reads`) or without having said so, and what is called `deadly` until it dies, the first time. */
 const HOG = `
   import ${JSON.stringify(SCRIPT)};
   addEventListener('message', ({ data: { type, id, request } }) => {
     if (type !== 'load' || !request.url.includes('endless')) return;
     if (request.url.includes('reads')) postMessage({ type: 'reading', id });
     for (;;) Math.random();
-  });
-  // Ends its own thread while it reads, and says nothing.
-  addEventListener('message', ({ data: { type, id, request } }) => {
-    if (type !== 'load' || !request.url.includes('deadly')) return;
-    postMessage({ type: 'reading', id });
-    close();
   });`;
 const HOG_URL = URL.createObjectURL(new Blob([HOG], { type: 'text/javascript' }));
 const ENDLESS = `${COMPASS}?endless&reads`;
@@ -156,20 +150,6 @@ describe('a worker that dies', () => {
     assert(time < 3_000, `the next load took ${time.toFixed(0)} ms`);
     await element.ready;
     assertEqual([element.loaded, element.error], [true, null], 'the one that was under way');
-  });
-
-  it('without a word, while it reads: the next load has another at once, and the deadly one ends with an error', async () => {
-    GaussianSplatElement.sceneLoader = new Loader(() => hogWorker());
-    await showLoaded();
-    const deadly = show({ src: `${COMPASS}?deadly` });
-    const ended = timeOf(() => deadly.ready);
-    await delay(50);
-    const time = await timeOf(() => showLoaded());
-    assert(time < 3_000, `the next load took ${time.toFixed(0)} ms`);
-    // It is tried once more, alone.
-    assert((await ended) < 6_000, 'the deadly load ends');
-    assertEqual([deadly.loaded, deadly.error?.reason], [false, 'out-of-memory/allocation']);
-    await until(() => living.length <= 1, `the end of the dead, of which ${living.length} are held`);
   });
 
   it('without a word, while it rests: the next load has another', async () => {

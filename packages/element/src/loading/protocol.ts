@@ -135,8 +135,6 @@ export type WorkerMessage =
   /** The script runs. */
   | { readonly type: 'ready' }
   | { readonly type: 'pong' }
-  /** It holds a Web Lock of this name for as long as its thread lives. */
-  | { readonly type: 'lives'; readonly lock: string }
   /** From now on it reads for a request, and may not answer for long. */
   | { readonly type: 'reading'; readonly id: number }
   /** It has read for a request, or nothing is done for it any more. */

@@ -136,10 +136,10 @@ function serve(scope: WorkerScope): void {
     const work: Work = { abort: new AbortController() };
     const { signal } = work.abort;
     running.set(id, work);
-    const asked = 'request' in message && 'file' in message.request ? message.request : undefined;
-    // The name of the file is behind the address.
-    if (asked?.file) Object.assign(asked, { url: URL.createObjectURL(asked.file) + new URL(asked.url).hash });
     try {
+      const asked = 'request' in message && 'file' in message.request ? message.request : undefined;
+      // The name of the file is behind the address.
+      if (asked?.file) Object.assign(asked, { url: URL.createObjectURL(asked.file) + new URL(asked.url).hash });
       const [answer, transfer] = await answerTo(id, work, message);
       if (!signal.aborted) scope.postMessage({ type: 'answer', id, answer }, transfer);
     } catch (error) {
@@ -162,15 +162,6 @@ function serve(scope: WorkerScope): void {
     else void run(data.id, data);
   });
   scope.postMessage({ type: 'ready' });
-  holdLock((lock) => scope.postMessage({ type: 'lives', lock }));
-}
-
-/** A lock falls free when its thread ends, however busy that was and whatever ended it: browsers tell pages of it in no other way. */
-function holdLock(onHeld: (name: string) => void): void {
-  // Pages of no origin, such as sandboxed frames, have no locks.
-  const { locks } = navigator as { locks?: LockManager };
-  const name = `gaussian-splat ${Math.random()}`;
-  locks?.request(name, () => (onHeld(name), new Promise(() => undefined))).catch(() => undefined);
 }
 
 const isWorker = typeof document === 'undefined' && 'WorkerGlobalScope' in globalThis;

@@ -12,7 +12,7 @@ const TICK_MS = 100;
 const BUSY = 2;
 /** And after which what else waits in it begins again elsewhere, and a worker whose load was called off is ended. */
 const SILENT = 5;
-/** And after which it counts as dead, whatever it was said to read, where there are no locks to tell. */
+/** And after which it counts as dead, whatever it was said to read: browsers do not tell. */
 const DEAD = 600;
 /** A script that takes longer is loaded without the worker, ms. */
 const START_MS = 2_000;
@@ -166,7 +166,6 @@ export class WorkerPool {
       return this.#rest(slot, IDLE_MS);
     }
     if (message.type === 'pong') return;
-    if (message.type === 'lives') return slot.watch(message.lock, () => this.#relieve(slot, true));
     if (message.type === 'reading') return void (slot.reading = message.id);
     if (message.type === 'rested') return void (slot.reading = slot.reading === message.id ? undefined : slot.reading);
     const job = slot.jobs.get(message.id);
@@ -240,7 +239,8 @@ export class WorkerPool {
   };
 
   /** What waits in a worker that does not answer begins again elsewhere. Without a load of its own it reads what nobody wants, or is dead. */
-  #relieve(slot: WorkerSlot, isDead = slot.missed >= DEAD): void {
+  #relieve(slot: WorkerSlot): void {
+    const isDead = slot.missed >= DEAD;
     const reader = isDead ? undefined : slot.reader;
     const jobs = [...slot.jobs.values()].filter((job) => job !== reader);
     const guilty = slot.reader;

@@ -29,8 +29,6 @@ export class WorkerSlot {
   missed = 0;
   /** What it has last said to read: that alone keeps it from answering. */
   reading: number | undefined;
-  /** Ends the wait for its end. */
-  readonly #watch = new AbortController();
   startTimer: ReturnType<typeof setTimeout> | undefined;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
 
@@ -87,14 +85,7 @@ export class WorkerSlot {
     this.worker.postMessage(message, transfer);
   }
 
-  /** @param lock held by the worker until its thread ends */
-  watch(lock: string, onEnded: () => void): void {
-    const { signal } = this.#watch;
-    navigator.locks.request(lock, { signal }, () => signal.aborted || onEnded()).catch(() => undefined);
-  }
-
   end(): void {
-    this.#watch.abort();
     clearTimeout(this.#idleTimer);
     clearTimeout(this.startTimer);
     this.worker.terminate();
