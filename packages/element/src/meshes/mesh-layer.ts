@@ -64,7 +64,7 @@ export class MeshLayer implements MeshDrawing {
     return new MeshLayer(device, renderer);
   }
 
-  draw({ camera, target }: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<Picture> {
+  draw({ camera, target, background }: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<Picture> {
     this.#arrange(models, world);
     this.#look(camera, world);
     const { width, height } = camera;
@@ -77,7 +77,7 @@ export class MeshLayer implements MeshDrawing {
     const color = backend.get(this.#target.texture).texture!;
     const depth = backend.get(this.#target.depthTexture!).texture!;
     this.#near = camera.near;
-    return { over: 'target', depth: this.#depthFor(this.#resolve.run(color, depth, target)) };
+    return { over: 'target', depth: this.#depthFor(this.#resolve.run(color, depth, target, background)) };
   }
 
   /** Ends what was found of splats where a mesh is nearer. */

@@ -1,4 +1,8 @@
 /** From what three.js has drawn, in linear light and with several samples a pixel, to the frame and one depth a pixel. */
+import type { Rgba } from '@gaussian-splat/renderer';
+
+/** Premultiplied colours over what is there. */
+const OVER: GPUBlendComponent = { srcFactor: 'one', dstFactor: 'one-minus-src-alpha' };
 
 const SHADER = /* wgsl */ `
 @group(0) @binding(0) var drawn: texture_2d<f32>;
@@ -84,14 +88,17 @@ export class MeshResolve {
     return this.#depth;
   }
 
-  /** @returns the depth of the frame; the same texture while its size is */
-  run(color: GPUTexture, depth: GPUTexture, target: GPUTexture): GPUTexture {
+  /**
+   * @param background what is behind the meshes, premultiplied
+   * @returns the depth of the frame; the same texture while its size is
+   */
+  run(color: GPUTexture, depth: GPUTexture, target: GPUTexture, background: Rgba = [0, 0, 0, 0]): GPUTexture {
     const own = this.#depthOf(target);
     if (this.#bound?.color !== color || this.#bound.depth !== depth) this.#bound = this.#bind(color, depth);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.mesh_resolve' });
     const pass = encoder.beginRenderPass({
       label: 'gs.mesh_resolve',
-      colorAttachments: [{ view: target.createView(), loadOp: 'clear', storeOp: 'store' }],
+      colorAttachments: [{ view: target.createView(), loadOp: 'clear', clearValue: [...background], storeOp: 'store' }],
       depthStencilAttachment: {
         view: own.createView(),
         depthLoadOp: 'clear',
@@ -179,7 +186,7 @@ export class MeshResolve {
       label: 'gs.mesh_resolve',
       layout: this.#device.createPipelineLayout({ bindGroupLayouts: [this.#layout] }),
       vertex: { module: this.#module },
-      fragment: { module: this.#module, targets: [{ format }] },
+      fragment: { module: this.#module, targets: [{ format, blend: { color: OVER, alpha: OVER } }] },
       depthStencil: { format: 'depth32float', depthWriteEnabled: true, depthCompare: 'always' },
     });
     this.#pipelines.set(format, pipeline);
