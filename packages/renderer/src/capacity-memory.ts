@@ -81,11 +81,9 @@ export class CapacityMemory {
     };
   }
 
-  /** What the last picture that was looked at needs when it is whole, with so many times as much room; undefined where none was looked at. */
-  needed(headroom: number): Capacity | undefined {
-    if (this.#last === undefined) return undefined;
-    const { visible, pairs } = this.wholeNeedBy(this.#last);
-    return { visible: Math.ceil(headroom * visible), pairs: Math.ceil(headroom * pairs) };
+  /** What the last frame that was looked at needs when it is whole; undefined where none was looked at. */
+  get lastNeed(): Capacity | undefined {
+    return this.#last && this.wholeNeedBy(this.#last);
   }
 
   /** What the last whole picture needed, if that had so many pixels. */

@@ -16,7 +16,7 @@ export const LEAST_CAPACITY: Capacity = { visible: 1, pairs: LEAST_PAIRS };
 /** Room for pairs that small scenes get without asking, so that a first frame from near by has it: 32 MB. */
 const GENEROUS_PAIRS = 1 << 21;
 /** More room than was needed. */
-export const HEADROOM = 1.25;
+const HEADROOM = 1.25;
 /** Share of the room that must be in use before there is more, or less. */
 const FULL = 0.92;
 const SLACK = 0.7;

@@ -1,6 +1,6 @@
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityMemory, type Capacity } from './capacity-memory.js';
-import { CapacityMonitor, CountBuffers, HEADROOM, initialCapacity, LEAST_CAPACITY } from './capacity.js';
+import { CapacityMonitor, CountBuffers, initialCapacity, LEAST_CAPACITY } from './capacity.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
@@ -109,8 +109,8 @@ export class FrameResources {
   /** Visible splats to have room for once so many may come. What stood empty before is room, too. */
   #visibleWith(coming: number, most: Capacity): number {
     const { visible } = this.#capacity!;
-    const needed = this.#memory.needed(HEADROOM);
-    if (needed !== undefined && needed.visible + coming <= visible) return visible;
+    const { lastNeed } = this.#memory;
+    if (lastNeed && lastNeed.visible + coming <= visible) return visible;
     return Math.min(most.visible, visible + coming);
   }
 
