@@ -216,7 +216,7 @@ describe('src', () => {
       { src: `${FIXTURES}green.splat` },
       'width: 120px; height: 100px; --poster-transition: 0s',
     );
-    element.src = '/net/slow/compass.ply?ms=800';
+    element.src = '/net/slow/compass.ply?ms=2500';
     await until(() => states(element).includes('loading'), 'the state loading');
     assert(isGreen((await screenOf(element)).at(60, 50)), 'the old scene is seen');
     await element.ready;
