@@ -67,6 +67,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
  * @csspart controls-panel - The panel of the attribute `controls-panel`.
+ * @csspart controls-scene - the group of controls of a `<splat-scene>`, a `fieldset`
  * @csspart control - A control in it, with its label.
  * @csspart control-label - The label.
  * @csspart control-input - The slider, field or button.
