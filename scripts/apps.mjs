@@ -121,7 +121,7 @@ function command([program, ...args], cwd) {
 }
 
 function environment() {
-  // Both are of whoever runs this: builds of users have neither.
+  // Both come from the environment of this command: builds of users have neither.
   const { NODE_ENV, INIT_CWD, ...inherited } = process.env;
   void [NODE_ENV, INIT_CWD];
   return { ...inherited, NEXT_TELEMETRY_DISABLED: '1', ASTRO_TELEMETRY_DISABLED: '1', NG_CLI_ANALYTICS: 'false' };

@@ -8,7 +8,7 @@ export const shaderFolder = fileURLToPath(new URL('../../shaders/', import.meta.
 const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
 const IMPORT = /^#import (\S+)$/gm;
 
-/** A shader and all files that it imports, each once, before whoever asks for it, with others in place of some. */
+/** A shader and all files that it imports, each once, before the files that import it, with others in place of some. */
 export function partsOf(path, replaced, seen = new Set()) {
   if (seen.has(path)) return [];
   seen.add(path);

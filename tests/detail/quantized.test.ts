@@ -30,7 +30,7 @@ after(endNodeDevice);
 const { CULL_GROUP } = constants;
 /** Exact painting, so that what differs is what was quantized. */
 const serial = { threads: 'serial', sort: 'serial', rasterizer: 'tiles' } as const;
-/** Pages come for whoever draws: quads are several times as fast here. */
+/** Pages come with any rasterizer: quads are several times as fast here. */
 const fast = { threads: 'serial', rasterizer: 'quads' } as const;
 const quantized = { geometry: 'quantized' } as const;
 

@@ -1,4 +1,4 @@
-/** How many instances a recorded run computes for so many that ask. */
+/** How many instances a recorded run computes, by the number of those that ask. */
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { stepOf } from '../../packages/generator/src/batch/step-sessions.js';

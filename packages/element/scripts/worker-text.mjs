@@ -20,7 +20,7 @@ export const workerAsText = {
     ...{ entryFileNames: '[name].js', chunkFileNames: '[name].js', externalLiveBindings: false },
   }),
   renderDynamicImport: () => ({ left: `${LOAD}(`, right: ')' }),
-  // It has no address: what lies beside it, nobody knows.
+  // It has no address, so there is nothing beside it.
   resolveImportMeta: () => 'undefined',
   generateBundle(_, bundle) {
     const chunks = Object.values(bundle).filter(({ type }) => type === 'chunk');

@@ -31,7 +31,7 @@ export class Download {
   /** Asks for the whole file. @returns the error of a server that has no time now. */
   async start(): Promise<Error | undefined> {
     const response = await this.#request({});
-    // What is said to be a part, or nothing, is no file, though nobody would call it an error.
+    // A partial answer or an empty one is no file, although its status is no error.
     if (response.status === 200 || response.status === 203) return void this.#begin(response);
     await discard(response);
     const error = badStatus(this.#address, response);

@@ -106,7 +106,7 @@ export class FrameResources {
     return this.#rebind(table);
   }
 
-  /** Visible splats to have room for once so many may come. What stood empty before is room, too. */
+  /** Visible splats to have room for when `coming` more may be visible. Room that is empty counts. */
   #visibleWith(coming: number, most: Capacity): number {
     const { visible } = this.#capacity!;
     const { lastNeed } = this.#memory;

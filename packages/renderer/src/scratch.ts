@@ -149,7 +149,7 @@ export class Scratch {
     encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
   }
 
-  /** A buffer of so many bytes for each visible splat, made when it is first asked for. */
+  /** A buffer with `bytes` for each visible splat, made when it is first asked for. */
   kept(name: string, bytes = 4): GPUBuffer {
     let buffer = this.#kept.get(name);
     if (buffer === undefined) {

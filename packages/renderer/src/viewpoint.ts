@@ -309,7 +309,7 @@ export class Viewpoint {
   #orderOf({ order }: Levers): PixelOrder | undefined {
     if (order === 'center') return undefined;
     const lazy = orderOn(this.#device);
-    // Whoever asks whether the frame is complete is told of an error.
+    // A caller that asks whether the frame is complete gets the error.
     if (!lazy.now) lazy.load().then(this.#onIncomplete, () => undefined);
     return lazy.now;
   }

@@ -42,7 +42,7 @@ export class PreviewUploads {
         await this.#upload(preview);
       }
     } catch {
-      // Whatever keeps a preview from the GPU will keep the whole from it, which says so.
+      // What keeps a preview from the GPU keeps the whole scene from it, too, and that load says so.
     } finally {
       this.#isBusy = false;
     }

@@ -81,7 +81,7 @@ class Previews {
     try {
       this.#options.onPreview?.(await GlLoaded.open(lease, preview, openOptions(this.#options, signal)));
     } catch {
-      // Whatever keeps a preview from the GPU will keep the whole from it, which says so.
+      // What keeps a preview from the GPU keeps the whole scene from it, too, and that load says so.
       lease.release();
     } finally {
       this.#isBusy = false;

@@ -7,7 +7,7 @@ const PROBES = [
 ];
 /** The kind of the only chunk of a file that has nothing but its pixels, at byte 12: others may ask for colours or turns that a browser heeds. */
 const PLAIN = [0x56, 0x50, 0x38, 0x4c];
-/** Below so many bytes our decoder is done sooner. */
+/** Bytes of a file below which our decoder is done sooner. */
 const LEAST_BYTES = 4096;
 
 let isExact: Promise<boolean> | undefined;

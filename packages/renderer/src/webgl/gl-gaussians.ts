@@ -16,7 +16,7 @@ export type GlGaussianFacts = Omit<PackedGaussians, 'geometry' | 'sh' | 'chunks'
 export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
 
-/** Rows that so many texels take. */
+/** Rows of a texture that hold a number of texels. */
 export const rowsOf = (texels: number): number => Math.max(1, Math.ceil(texels / DATA_WIDTH));
 
 /** Packed Gaussians in textures. */

@@ -229,7 +229,7 @@ export class GlRenderer {
     gl.bindVertexArray(null);
   }
 
-  /** Of the canvas's size, whatever share of it is drawn: nothing is allocated while only the camera moves. */
+  /** Of the canvas's size, for any share of it that is drawn: nothing is allocated while only the camera moves. */
   #accumulationOf({ width, height }: Camera, wanted: AccumulationFormat): Accumulation {
     const gl = this.#gl;
     const format = blendable(gl, wanted);
