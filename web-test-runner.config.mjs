@@ -3,9 +3,12 @@
  * `npx web-test-runner [--files tests/element/browser/lifecycle.test.ts]`; for high-density.test.ts with TEST_GROUP=dense. CHROMIUM names the browser;
  * GAUSSIAN_SPLAT_GPU=system takes the machine's own GPU instead of SwiftShader.
  */
+import { relative } from 'node:path';
 import { defaultReporter } from '@web/test-runner';
 import { playwrightLauncher } from '@web/test-runner-playwright';
 import { findChromium, gpuFlags } from './scripts/lib/chromium.mjs';
+import { root } from './scripts/lib/run.mjs';
+import { failureLine } from './scripts/lib/slowest-reporter.mjs';
 import { pageCommands } from './tests/element/browser/support/commands.mjs';
 import { hostileServer, startOtherOrigin } from './tests/element/browser/support/server.mjs';
 import { typescript } from './tests/element/browser/support/typescript.mjs';
@@ -73,6 +76,12 @@ function countReporter() {
     for (const { skipped, passed } of suite?.tests ?? []) own[skipped ? 'skipped' : passed ? 'passed' : 'failed']++;
     return (suite?.suites ?? []).map(countOf).reduce(add, own);
   };
+  const failedIn = (suite, path = []) => [
+    ...(suite?.tests ?? [])
+      .filter(({ passed, skipped }) => !passed && !skipped)
+      .map((test) => ({ ...test, name: [...path, test.name].join(' > ') })),
+    ...(suite?.suites ?? []).flatMap((inner) => failedIn(inner, inner.name ? [...path, inner.name] : path)),
+  ];
   const add = (a, b) => ({ passed: a.passed + b.passed, failed: a.failed + b.failed, skipped: a.skipped + b.skipped });
   return {
     onTestRunFinished({ sessions }) {
@@ -81,8 +90,13 @@ function countReporter() {
       const broken = sessions.filter(
         ({ passed: fine, testResults }) => !fine && countOf(testResults).failed === 0,
       ).length;
-      for (const { testFile, testResults } of sessions.filter((session) => !session.passed))
+      for (const { testFile, testResults, errors } of sessions.filter((session) => !session.passed)) {
+        const tests = failedIn(testResults);
+        const found = tests.length > 0 ? tests : [{ name: 'the file', error: errors[0] }];
+        for (const { name, error } of found)
+          process.stdout.write(failureLine(relative(root, testFile), name, error?.message));
         console.log(`Failed: ${Math.max(1, countOf(testResults).failed)} of ${testFile}`);
+      }
       console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);
     },
   };

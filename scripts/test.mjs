@@ -34,7 +34,12 @@ const extent = isFull
     ? { TESTS: 'lab', SITE: 'full' }
     : {};
 const env = { ...gpuEnvironment(), ...extent, CHROMIUM: chromium };
-const { passed, failed, skipped } = await runTests(files, { env, isStatic: files.isWhole, failsUnsteady: isLab });
+const { passed, failed, skipped, failures } = await runTests(files, {
+  env,
+  isStatic: files.isWhole,
+  failsUnsteady: isLab,
+});
+for (const failure of failures) console.log(failure);
 console.log(`\n${passed} passed, ${failed} failed, ${skipped} skipped`);
 process.exit(failed > 0 || passed === 0 ? 1 : 0);
 

@@ -18,7 +18,7 @@ const WORDS = ['scripts/words.mjs'];
  * @param env variables of all that runs.
  * @param isStatic whether types and style are looked at, too.
  * @param failsUnsteady whether a file that passes only when it runs again, alone, has failed.
- * @returns how many tests passed, failed and were skipped.
+ * @returns how many tests passed, failed and were skipped, and a line for each that failed.
  */
 export async function runTests({ node, browser }, { env, isStatic = false, failsUnsteady = false }) {
   const isBeside = browser.length > 0;
@@ -33,11 +33,18 @@ export async function runTests({ node, browser }, { env, isStatic = false, fails
       ...(isStatic ? await runStatic(options) : []),
     ]),
   ]);
-  return results.flat().reduce(sum, { passed: 0, failed: 0, skipped: 0 });
+  return results.flat().reduce(sum, NONE);
 }
 
+const NONE = { passed: 0, failed: 0, skipped: 0, failures: [] };
+
 function sum(a, b) {
-  return { passed: a.passed + b.passed, failed: a.failed + b.failed, skipped: a.skipped + b.skipped };
+  return {
+    passed: a.passed + b.passed,
+    failed: a.failed + b.failed,
+    skipped: a.skipped + b.skipped,
+    failures: [...a.failures, ...b.failures],
+  };
 }
 
 /** Files in one process, and those that draw on one device. */
@@ -56,7 +63,7 @@ function runAlone(files, concurrency, options) {
 }
 
 async function runNode(files, concurrency, options, count) {
-  if (count === 0) return { passed: 0, failed: 0, skipped: 0 };
+  if (count === 0) return NONE;
   const reporters = ['spec', './scripts/lib/slowest-reporter.mjs'].flatMap((name) => [
     `--test-reporter=${name}`,
     '--test-reporter-destination=stdout',
@@ -70,7 +77,7 @@ async function runStatic(options) {
   const counts = [];
   for (const args of [TSC, ESLINT, WORDS]) {
     const { status } = await runAsync(process.execPath, args, options);
-    counts.push({ passed: 0, failed: status === 0 ? 0 : 1, skipped: 0 });
+    counts.push(status === 0 ? NONE : { ...NONE, failed: 1, failures: [`Failed: ${args.join(' ')}`] });
   }
   return counts;
 }
@@ -80,27 +87,24 @@ async function runStatic(options) {
  * run once more, by themselves. One that passes then is named as unsteady; one that fails again has failed.
  */
 async function runBrowser(groups, options, failsUnsteady) {
-  const total = [];
-  const failed = [];
-  for (const [group, files] of Object.entries(groups)) {
-    if (files.length === 0) continue;
-    const result = await inChromium(group, files, options);
-    total.push(result);
-    failed.push(...result.failures.map((file) => ({ group, file })));
-  }
-  const first = total.reduce(sum, { passed: 0, failed: 0, skipped: 0 });
-  if (failed.length === 0 || failed.length > MOST_UNSTEADY) return first;
-  let [passed, stillFailed] = [first.passed, first.failed];
-  for (const { group, file } of failed) {
+  const results = [];
+  for (const [group, files] of Object.entries(groups))
+    if (files.length > 0) results.push({ group, ...(await inChromium(group, files, options)) });
+  const failed = results.flatMap(({ group, failedIn }) =>
+    [...failedIn].map(([file, count]) => ({ group, file, count })),
+  );
+  if (failed.length > MOST_UNSTEADY) return results;
+  for (const { group, file, count } of failed) {
     const again = await inChromium(group === 'dense' ? group : 'timing', [file], options);
     if (again.failed > 0) continue;
     console.log(`unsteady: ${file} failed beside the others and passed alone`);
     if (failsUnsteady) continue;
-    const before = total.find(({ failuresOf }) => failuresOf.has(file)).failuresOf.get(file);
-    passed += before;
-    stillFailed -= before;
+    const result = results.find(({ failedIn }) => failedIn.has(file));
+    result.passed += count;
+    result.failed -= count;
+    result.failures = result.failures.filter((line) => !line.includes(`${file}:`));
   }
-  return { passed, failed: stillFailed, skipped: first.skipped };
+  return results;
 }
 
 /** Counts of one group of files, and those that failed with how many of their tests did. */
@@ -108,18 +112,25 @@ async function inChromium(group, files, options) {
   const args = ['node_modules/@web/test-runner/dist/bin.js', '--config', 'web-test-runner.config.mjs'];
   const env = { ...options.env, TEST_GROUP: group, TEST_FILES: files.join(' ') };
   const result = await runAsync(process.execPath, args, { ...options, env });
-  const failuresOf = new Map(
+  const failedIn = new Map(
     [...result.text.matchAll(/^Failed: (\d+) of (.+)$/gm)].map(([, count, file]) => [
       relative(root, file).replaceAll('\\', '/'),
       Number(count),
     ]),
   );
-  return { ...countsOf('Chromium', result), failures: [...failuresOf.keys()], failuresOf };
+  return { ...countsOf('Chromium', result), failedIn };
 }
 
 /** What a closing line says; a run that ended badly without naming a failure is one. */
 function countsOf(name, { text, status }) {
   const line = new RegExp(`^${name}: (\\d+) passed, (\\d+) failed, (\\d+) skipped$`, 'm').exec(text);
   const [, passed = 0, failed = 0, skipped = 0] = line?.map(Number) ?? [];
-  return { passed, failed: status !== 0 && failed === 0 ? 1 : failed, skipped };
+  const failures = [...text.matchAll(/^Failed test: .+$/gm)].map(([failure]) => failure);
+  if (status === 0 || failed > 0) return { passed, failed, skipped, failures };
+  return {
+    passed,
+    failed: 1,
+    skipped,
+    failures: [...failures, `Failed: the run of ${name} ended with status ${status}`],
+  };
 }
