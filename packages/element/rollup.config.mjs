@@ -42,20 +42,34 @@ const typesOfThree = {
   writeBundle: () => cpSync(path('./src/meshes/three.d.ts'), path('./dist/meshes/three.d.ts')),
 };
 
-const plugins = [
+/** three.js comes short, and is most of what there is: to make it shorter once more takes longer than all else. */
+const hasThree = ({ moduleIds }) => moduleIds.includes(path('./dist/meshes/three.js'));
+const butThree = (plugin) => ({
+  ...plugin,
+  renderChunk(code, chunk, ...rest) {
+    return hasThree(chunk) ? null : plugin.renderChunk.call(this, code, chunk, ...rest);
+  },
+});
+
+const sources = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
-  shortPrivates,
   minifyTemplateLiterals({
     include: [path('./dist/styles.js'), path('./dist/template.js'), path('./dist/views/tour.js')],
   }),
+];
+const plugins = [
+  ...sources,
+  butThree(shortPrivates),
   // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
-  terser({
-    module: true,
-    ecma: 2022,
-    compress: { passes: 4, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
-    format: { comments: false },
-  }),
+  butThree(
+    terser({
+      module: true,
+      ecma: 2022,
+      compress: { passes: 4, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
+      format: { comments: false },
+    }),
+  ),
 ];
 
 /** three.js has sources of its own: a map of them would weigh more than all else in the package. */
@@ -63,7 +77,7 @@ const noMapOfThree = {
   name: 'no-map-of-three',
   generateBundle(_options, bundle) {
     for (const chunk of Object.values(bundle)) {
-      if (!chunk.moduleIds?.includes(path('./dist/meshes/three.js'))) continue;
+      if (!chunk.moduleIds || !hasThree(chunk)) continue;
       delete bundle[`${chunk.fileName}.map`];
       chunk.code = chunk.code.replace(/\n\/\/# sourceMappingURL=\S+\s*$/, '\n');
       chunk.map = null;
@@ -164,7 +178,7 @@ export default [
   {
     // All in one module, for `gaussian-splat page --single`.
     input: path('./dist/index.js'),
-    plugins,
+    plugins: [...sources, shortText],
     output: { file: path('../cli/dist/single.js'), format: 'es', inlineDynamicImports: true },
   },
 ];
