@@ -40,9 +40,9 @@ export default {
   nodeResolve: { exportConditions: ['browser'] },
   concurrency: CONCURRENCY[group],
   concurrentBrowsers: 1,
-  browserStartTimeout: 60_000,
-  testsFinishTimeout: isFull ? 1_800_000 : 240_000,
-  testFramework: { config: { ui: 'bdd', timeout: isFull ? 900_000 : 60_000 } },
+  browserStartTimeout: 240_000,
+  testsFinishTimeout: isFull ? 1_800_000 : 900_000,
+  testFramework: { config: { ui: 'bdd', timeout: isFull ? 900_000 : 180_000 } },
   testRunnerHtml: (framework) =>
     `<!doctype html><html><body><script>STABILITY = ${JSON.stringify(process.env.STABILITY ?? 'fast')}; TESTS = ${JSON.stringify(process.env.TESTS ?? 'fast')}</script><script type="module" src="${framework}"></script></body></html>`,
   browsers: [chromium(group === 'dense' ? 2 : 1)],

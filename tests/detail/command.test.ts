@@ -36,7 +36,7 @@ function detail(...args: string[]): { status: number | null; text: string } {
     ['packages/cli/bin/gaussian-splat.mjs', 'detail', ...args],
     {
       encoding: 'utf8',
-      timeout: isLab ? 400_000 : 60_000,
+      timeout: isLab ? 400_000 : 240_000,
     },
   );
   return { status, text: stdout + stderr };

@@ -50,19 +50,23 @@ export async function frames(count = 2): Promise<void> {
   for (let i = 0; i < count; i++) await new Promise(requestAnimationFrame);
 }
 
-/** Waits until a condition holds. */
+/** A machine that is slow, or busy, takes several times as long: what never comes is found all the same. */
+const PATIENCE = 4;
+
+/** Waits until a condition holds: `limitMs` on a machine that has nothing else to do. */
 export async function until(condition: () => boolean, what: string, limitMs = 20_000): Promise<void> {
-  const end = real.now() + limitMs;
+  const end = real.now() + PATIENCE * limitMs;
   while (!condition()) {
-    assert(real.now() < end, `waited ${limitMs} ms for ${what}`);
+    assert(real.now() < end, `waited ${PATIENCE * limitMs} ms for ${what}`);
     await new Promise((resolve) => real.setTimeout(resolve, 10));
   }
 }
 
-/** The next event of a type, or a failure after a while. */
+/** The next event of a type, or a failure after a while: `limitMs` on a machine that has nothing else to do. */
 export function nextEvent<T extends Event>(target: EventTarget, type: string, limitMs = 20_000): Promise<T> {
   return new Promise((resolve, reject) => {
-    const timer = real.setTimeout(() => reject(new Error(`no event ${type} within ${limitMs} ms`)), limitMs);
+    const most = PATIENCE * limitMs;
+    const timer = real.setTimeout(() => reject(new Error(`no event ${type} within ${most} ms`)), most);
     target.addEventListener(
       type,
       (event) => {
