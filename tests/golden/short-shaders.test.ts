@@ -13,16 +13,11 @@ import { endNodeDevice } from '../support/node-device.js';
 interface Plugin {
   readonly piecesIn: (text: string) => Map<string, string>;
   readonly joinedIn: (text: string) => string[][];
-  readonly REPLACED: Replaced;
   readonly SHADER_FILES: readonly string[];
   readonly shortShaders: () => {
     buildStart(): void;
     transform(code: string, id: string): { readonly code: string } | null;
   };
-}
-interface Replaced {
-  readonly keptNames: readonly string[];
-  readonly keptLines: RegExp;
 }
 interface Token {
   readonly lexeme: string;
@@ -34,15 +29,11 @@ interface Reflect {
   readonly WgslReflect: new (code: string) => Readonly<Record<'uniforms' | 'storage' | 'textures', Placed>>;
 }
 const scripts = '../../packages/element/scripts/';
-const { piecesIn, joinedIn, REPLACED, SHADER_FILES, shortShaders } = (await import(
+const { piecesIn, joinedIn, SHADER_FILES, shortShaders } = (await import(
   `${scripts}shader-plugin.mjs`
 )) as Plugin;
 const { shortened } = (await import(`${scripts}short-wgsl.mjs`)) as {
-  shortened: (
-    pieces: Map<string, string>,
-    joined: readonly (readonly string[])[],
-    options: Replaced,
-  ) => Map<string, string>;
+  shortened: (pieces: Map<string, string>, joined: readonly (readonly string[])[]) => Map<string, string>;
 };
 const reflection: string = 'wgsl_reflect/wgsl_reflect.module.js';
 const { WgslReflect, WgslScanner } = (await import(reflection)) as Reflect;
@@ -130,7 +121,6 @@ test('token by token they are the same but for names, each has one other, and tw
     before += code.length;
     now += forms.short[k].code.length;
   });
-  for (const name of REPLACED.keptNames) assert.equal(shortOf.get(name) ?? name, name);
   console.log(`${shortOf.size} names; ${before} characters, ${now} short`);
   assert.ok(shortOf.size > 700 && now < 0.6 * before);
 });
@@ -202,8 +192,7 @@ return vec4f(shade(far, 0.5e-3), f32(position[index]) , 0.0, 1.0);
 }`;
 
 test('words of the language, overridable constants and shadowed functions stay', () => {
-  const replaced = { keptNames: ['taken'], keptLines: /^let far/ };
-  const short = shortened(new Map([['hard', HARD]]), [['hard']], replaced).get('hard')!;
+  const short = shortened(new Map([['hard', HARD]]), [['hard']]).get('hard')!;
   for (const word of [
     'is_final',
     '@builtin(position)',
@@ -212,15 +201,15 @@ test('words of the language, overridable constants and shadowed functions stay',
     '.fract',
     '.zyx',
     'fn main(',
-    'taken',
     '0.5e-3',
   ]) {
     assert.ok(short.includes(word), `${word}:\n${short}`);
   }
-  assert.match(short, /taken=distance- -/);
-  assert.match(short, /\n@vertex\nfn main/);
-  assert.match(short, /let \w+ = distance\(/);
-  assert.doesNotMatch(short, /shade|view|near/i);
+  assert.match(short, /let \w+=distance- -/);
+  assert.match(short, /}@vertex fn main/);
+  assert.doesNotMatch(short, /\n/);
+  assert.match(short, /let \w+=distance\(/);
+  assert.doesNotMatch(short, /shade|view|near|taken/i);
   assert.equal(piecesIn('export const aPart = "fn \\"x\\"\\n";\n').get('aPart'), 'fn "x"\n');
   assert.deepEqual(joinedIn("  code: aPart + '\\n' + bPart,\n  code: bPart,\n"), [['aPart', 'bPart'], ['bPart']]);
 });
@@ -252,14 +241,14 @@ test('names that never meet may become one, and others do not', () => {
     ['both', 'one'],
     ['both', 'other'],
   ];
-  const short = shortened(new Map(Object.entries(PIECES)), joined, { keptNames: [], keptLines: /^ / });
+  const short = shortened(new Map(Object.entries(PIECES)), joined);
   const found = (key: string, pattern: RegExp): string => pattern.exec(short.get(key)!)![1];
   const [first, second] = [found('one', /var<private>(\w+):/), found('other', /var<private>(\w+):/)];
   const twice = found('both', /fn (\w+)\(/);
-  const far = found('both', /,\n(\w+):f32,\n}/);
+  const far = found('both', /,(\w+):f32,}/);
   assert.notEqual(first, twice);
   assert.equal(found('one', new RegExp(`return ${twice}\\(\\w+\\.(\\w+)\\)`)), far);
-  const [, sum, counter] = /var (\w+)=0\.0;\nfor\(var (\w+)=/.exec(short.get('other')!)!;
+  const [, sum, counter] = /var (\w+)=0\.0;for\(var (\w+)=/.exec(short.get('other')!)!;
   assert.equal(new Set([sum, counter, second, twice]).size, 4);
   const side = found('one', /let (\w+)=/);
   assert.ok(new Set([first, side, second, sum, counter]).size < 5, 'of two shaders');

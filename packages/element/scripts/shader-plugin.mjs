@@ -3,24 +3,18 @@ import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { shortened } from './short-wgsl.mjs';
 
-const folder = (name) => fileURLToPath(new URL(`../../${name}/dist/generated/`, import.meta.url));
+const FOLDER = fileURLToPath(new URL('../../renderer/dist/generated/', import.meta.url));
 /** Where scripts/build-shaders.mjs and the compiler put the pieces that shaders are joined of. */
 export const SHADER_FILES = [
-  ...[
-    'shaders.js',
-    'live-shaders.js',
-    'streamed-shaders.js',
-    'quantized-shaders.js',
-    'probe-shaders.js',
-    'depth-shaders.js',
-    'linear-shaders.js',
-    'order-shaders.js',
-  ].map((file) => folder('renderer') + file),
-];
-
-/** What variants of shaders find by its text and replace: see `specialise` in packages/renderer/src/gpu/kernel.ts. */
-const keptNames = 'Value VALUE_WORDS value bits word'.split(' ');
-export const REPLACED = { keptNames, keptLines: new RegExp(`^(const|alias) (${keptNames.join('|')})\\b`) };
+  'shaders.js',
+  'live-shaders.js',
+  'streamed-shaders.js',
+  'quantized-shaders.js',
+  'probe-shaders.js',
+  'depth-shaders.js',
+  'linear-shaders.js',
+  'order-shaders.js',
+].map((file) => FOLDER + file);
 
 const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;
 
@@ -41,7 +35,7 @@ export function shortShaders() {
     buildStart() {
       const texts = SHADER_FILES.map((file) => readFileSync(file, 'utf8'));
       const pieces = new Map(texts.flatMap((text) => [...piecesIn(text)]));
-      short = shortened(pieces, texts.flatMap(joinedIn), REPLACED);
+      short = shortened(pieces, texts.flatMap(joinedIn));
     },
     transform(code, id) {
       if (!SHADER_FILES.includes(id)) return null;

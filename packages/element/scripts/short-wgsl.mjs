@@ -67,11 +67,11 @@ function scopesOf(pieces, joined) {
 }
 
 /** A short name for each, the most frequent first: the first one that no scope with the name has. */
-function renaming(pieces, kept, joined) {
+function renaming(pieces, joined) {
   const text = [...pieces.values()].join('\n');
   const count = new Map();
   for (const name of namesIn(text)) count.set(name, (count.get(name) ?? 0) + 1);
-  const foreign = new Set([...kept, ...foreignIn(text)]);
+  const foreign = new Set(foreignIn(text));
   const own = new Set(
     [...firstsOf(text, DECLARATION), ...firstsOf(text, TYPED)].filter(
       (name) => !foreign.has(name) && !BUILT_IN_FIELD.test(name),
@@ -98,21 +98,17 @@ const isWord = (character) => /\w/.test(character);
 const isOperator = (character) => /[-+*/%&|^<>=!~]/.test(character);
 const needsSpace = (a, b) => (isWord(a) && isWord(b)) || (isOperator(a) && isOperator(b));
 
-const withoutSpaces = (line) =>
-  line.replace(/(?<=(\S))\s+(?=(\S))/g, (_, before, behind) => (needsSpace(before, behind) ? ' ' : ''));
+const withoutSpaces = (code) =>
+  code.trim().replace(/(?<=(\S))\s+(?=(\S))/g, (_, before, behind) => (needsSpace(before, behind) ? ' ' : ''));
 
 /**
  * @param {Map<string, string>} pieces WGSL without comments, by any key
  * @param {readonly (readonly string[])[]} joined the keys of each shader's pieces
- * @param {{keptNames: readonly string[], keptLines: RegExp}} options names that stay, and lines whose spaces do: what replaces text looks for it
  * @returns {Map<string, string>} the same keys
  */
-export function shortened(pieces, joined, { keptNames, keptLines }) {
+export function shortened(pieces, joined) {
   const marked = new Map([...pieces].map(([key, code]) => [key, dotted(code)]));
-  const names = renaming(marked, keptNames, joined);
-  const short = (line) => {
-    const renamed = undotted(line.replace(NAME, (name) => names.get(name) ?? name));
-    return keptLines.test(line) ? renamed : withoutSpaces(renamed);
-  };
-  return new Map([...marked].map(([key, code]) => [key, code.split('\n').map(short).join('\n')]));
+  const names = renaming(marked, joined);
+  const short = (code) => withoutSpaces(undotted(code.replace(NAME, (name) => names.get(name) ?? name)));
+  return new Map([...marked].map(([key, code]) => [key, short(code)]));
 }

@@ -212,23 +212,18 @@ export function rareKernelOf<S extends ShaderDescription>(
   return perDevice(device, key, () => new ComputeKernel(device, shader, overrides));
 }
 
-/**
- * A shader with a piece of its text replaced, for what WGSL has no way to leave open: the format of a storage texture, the type of an
- * array's elements. Names in the text must be among those that the CDN build keeps: packages/element/scripts/shader-plugin.mjs.
- * @param variant tells it from the original among the things made once for a device
- */
-export function specialise<S extends ShaderDescription>(shader: S, variant: string, from: string, to: string): S {
-  if (!shader.code.includes(from)) throw new Error(`shader ${shader.name} has no "${from}"`);
-  return { ...shader, name: `${shader.name}.${variant}`, code: shader.code.replace(from, to) };
-}
-
-/** A shader whose storage texture `image` has another format than in its text. */
+/** A shader whose storage texture `image` has another format than in its text, which WGSL has no way to leave open. */
 export function storingInto<S extends ShaderDescription & { bindings: { image: ShaderBinding } }>(
   shader: S,
   format: GPUTextureFormat,
 ): S {
   const { image } = shader.bindings;
-  const from = `texture_storage_2d<${image.format}`;
-  const storing = specialise<ShaderDescription>(shader, format, from, `texture_storage_2d<${format}`);
-  return { ...storing, bindings: { ...shader.bindings, image: { ...image, format } } } as S;
+  const declared = `texture_storage_2d<${image.format}`;
+  if (!shader.code.includes(declared)) throw new Error(`shader ${shader.name} has no "${declared}"`);
+  return {
+    ...shader,
+    name: `${shader.name}.${format}`,
+    code: shader.code.replace(declared, `texture_storage_2d<${format}`),
+    bindings: { ...shader.bindings, image: { ...image, format } },
+  };
 }
