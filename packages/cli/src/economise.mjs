@@ -1,13 +1,15 @@
 /** The work behind `gaussian-splat economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
-import { statSync } from 'node:fs';
-import { resolve } from 'node:path';
+import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
+import { dirname, join, resolve } from 'node:path';
 import { boundsOf, cameraFromCalibration } from '@gaussian-splat/core';
 import {
   dealtViewsAround,
   dealViews,
   economise,
   encodingsFor,
+  filesOfZip,
   GpuEvaluator,
+  isLodIndex,
   MergingEvaluator,
   RefiningEvaluator,
   viewsBetween,
@@ -27,6 +29,7 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [opt
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --max-mb MB     instead of it: the most accurate file of at most this size
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to some 40 dB) or .ply
+                  FOLDER/lod-meta.json: streamed SOG, the same in files by level of detail, in an empty folder or one that does not exist yet
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
                   Larger ones are drawn with 1600 pixels a side
@@ -81,10 +84,29 @@ function checkFiles({ scene, out, views, report }) {
     const other = (file) => new UsageError(`--${option}: expected another file than ${file}, which is never changed`);
     if (isSameFile(path, scene)) throw other('SCENE');
     if (views && isSameFile(path, views)) throw other('that of --views');
-    const obstacle = obstacleTo(path);
+    const obstacle = option === 'out' && isLodIndex(path) ? obstacleInFolder(dirname(path)) : obstacleTo(path);
     if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
   }
   if (report && isSameFile(report, out)) throw new UsageError('--report: expected another file than that of --out');
+}
+
+/** What stands in the way of a folder that is filled, or undefined. */
+function obstacleInFolder(folder) {
+  if (!existsSync(folder)) return obstacleTo(folder);
+  if (!statSync(folder).isDirectory()) return `${folder} is no folder`;
+  return readdirSync(folder).length > 0
+    ? `the folder ${folder} is not empty`
+    : obstacleTo(join(folder, 'lod-meta.json'));
+}
+
+/** Writes what was found: a file, or the folder of a streamed scene, whose index comes last. */
+function writeOut(out, bytes) {
+  if (!isLodIndex(out)) return writeWhole(out, bytes);
+  for (const [path, file] of filesOfZip(bytes)) {
+    const target = isLodIndex(path) ? out : join(dirname(out), path);
+    mkdirSync(dirname(target), { recursive: true });
+    writeWhole(target, file);
+  }
 }
 
 function parseViews(path) {
@@ -206,7 +228,7 @@ async function main({
     economise(cloud, { ...{ minDecibels, name: out, evaluator, pool, encodeWebp }, onStep: say });
   const [minDecibels, result] =
     maxBytes === undefined ? [asked, await reach(asked)] : await withinBytes(reach, maxBytes, say);
-  writeWhole(out, result.bytes);
+  writeOut(out, result.bytes);
   const { splats, coefficients } = result;
   const spent = { read, prepare, ...result.seconds, total: seconds() };
   const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;

@@ -20,5 +20,7 @@ export {
 export { encodingsFor, type Encoding } from './write/index.js';
 export { allocateSteps, scaledSteps, type AllocateOptions, type Steps } from './allocate-steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
+export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
+export { filesOfZip } from './write/zip.js';
 export { writeMotion, type MotionOptions, type MotionSteps } from './write/motion.js';
 export { withNearAxes } from './write/near-axes.js';

@@ -7,6 +7,7 @@ import { writePly } from './ply.js';
 import { tuneSog } from './tune-sog.js';
 import { fractionalBitsOf, writeSpz } from './spz.js';
 import type { EncodeWebp } from './sog.js';
+import { isLodIndex } from './streamed-sog.js';
 
 /** What is written of a reduced cloud. */
 export type WrittenCloud = Pick<ReducedCloud, 'cloud' | 'degrees'>;
@@ -56,7 +57,7 @@ const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
 ]);
 
 /**
- * The ways to write a file of this name.
+ * The ways to write a file of this name; of `lod-meta.json`, an archive of a folder: see {@link filesOfZip}.
  * @param cloud what is to be written, as far as it is known
  * @param encoders what `.sog` is written with
  * @throws GaussianSplatError `argument/value` for a name with an unknown extension, for a scene trained with antialiasing where the format cannot say so, and for one
@@ -67,6 +68,7 @@ export function encodingsFor(
   cloud: Partial<Pick<GaussianCloud, 'antialiased' | 'positions' | 'origin'>> = {},
   encoders: Encoders = {},
 ): readonly Encoding[] {
+  if (isLodIndex(name)) return [tuneSog(encoders.encodeWebp, true)];
   const extension = /\.[a-z]+$/i.exec(name)?.[0].toLowerCase() ?? '';
   const found = extension === '.sog' ? [tuneSog(encoders.encodeWebp)] : ENCODINGS.get(extension);
   if (found === undefined) {
@@ -74,7 +76,8 @@ export function encodingsFor(
       where: name,
       expected: `a name that ends in ${[...ENCODINGS.keys(), '.sog'].join(', ')}`,
       found: extension || 'no extension',
-      remedy: 'choose .glb for accuracy, .sog for size, .ply for tools that know nothing else',
+      remedy:
+        'choose .glb for accuracy, .sog for size, lod-meta.json in a folder for streaming, .ply for tools that know nothing else',
     });
   }
   if (cloud.antialiased && extension === '.glb') {

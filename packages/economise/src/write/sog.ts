@@ -37,13 +37,27 @@ const MOST_PLACES = 65_535;
 const PALETTE_ROW = 64;
 /** Codes of a codebook; where steps leave more, larger ones are taken. */
 const MOST_CODES = 255;
+/** Of the values of a codebook: more are more bytes, and finer than any step. */
+const DIGITS = 6;
 const LN2 = Math.LN2;
 
 /** Writes SOG version 2 as a bundle. */
 export async function writeSog(cloud: GaussianCloud, options: SogOptions): Promise<Uint8Array<ArrayBuffer>> {
-  const { steps } = options;
   const order = packedOrder(cloud);
   if (order.length === 0) throw nothingToWrite();
+  return writeZip(await sogFiles(cloud, order, options));
+}
+
+/**
+ * The files of a SOG, by their names.
+ * @param order indices of the splats that it holds, one or more, as they follow one another in it
+ */
+export async function sogFiles(
+  cloud: GaussianCloud,
+  order: Uint32Array,
+  options: SogOptions,
+): Promise<ReadonlyMap<string, Uint8Array>> {
+  const { steps } = options;
   const images = new Map<string, Image>();
   const means = putMeans(cloud, order, steps.place, images);
   const scales = codebook(order, 3, (i, k) => Math.log(cloud.scales[3 * i + k]), LN2 * steps.size);
@@ -75,7 +89,7 @@ export async function writeSog(cloud: GaussianCloud, options: SogOptions): Promi
   for (const [name, { rgba, width, height }] of images) {
     files.set(name, await options.encodeWebp(rgba, width, height, options.effort ?? USUAL_EFFORT));
   }
-  return writeZip(files);
+  return files;
 }
 
 interface Image {
@@ -173,7 +187,8 @@ function codebook(
       codes[width * n + k] = Math.min(count - 1, Math.max(0, Math.round((of(i, k) - low) / spacing)));
     }
   });
-  return { values: Array.from({ length: count }, (_, code) => Math.fround(low + spacing * code)), codes };
+  const values = Array.from({ length: count }, (_, code) => Number((low + spacing * code).toPrecision(DIGITS)));
+  return { values, codes };
 }
 
 function putHarmonics(
@@ -211,7 +226,7 @@ function putHarmonics(
   return { count: palette.size, bands: shDegree, codebook: values };
 }
 
-function nothingToWrite(): GaussianSplatError {
+export function nothingToWrite(): GaussianSplatError {
   return new GaussianSplatError('argument/cloud', {
     where: 'scene that is written as SOG',
     expected: '1 splat or more that can be drawn',

@@ -1,7 +1,9 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { allocateSteps, scaledSteps } from '../allocate-steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
-import { writeSog, type EncodeWebp, type SogSteps } from './sog.js';
+import { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './sog.js';
+import { writeStreamedSog } from './streamed-sog.js';
+import { writeZip } from './zip.js';
 
 const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32 };
 /** Numbers of a splat that each is the step of. */
@@ -20,17 +22,24 @@ const QUICK = 0;
 /**
  * SOG whose steps, and whose palette, are as coarse as measurements allow.
  * @param encodeWebp undefined where only names are looked at
+ * @param isStreamed whether it is written as an archive of an index and files by level of detail; the steps are found on one file all the same
  */
-export function tuneSog(encodeWebp: EncodeWebp | undefined): Encoding {
+export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false): Encoding {
   return {
-    title: 'SOG version 2',
+    title: isStreamed ? 'streamed SOG' : 'SOG version 2',
     hasOneDegree: true,
     write: () => {
       throw withoutWebp();
     },
     tune: async (whole, measure, target) => {
       if (encodeWebp === undefined) throw withoutWebp();
-      return tuned(whole, measure, target, encodeWebp);
+      const { title, options } = await tuned(whole, measure, target, encodeWebp);
+      return {
+        title: `${isStreamed ? 'streamed ' : ''}${title}`,
+        hasOneDegree: true,
+        write: async ({ cloud }) =>
+          isStreamed ? writeZip(await writeStreamedSog(cloud, options)) : writeSog(cloud, options),
+      };
     },
   };
 }
@@ -40,7 +49,7 @@ async function tuned(
   measure: Measure,
   target: number,
   encodeWebp: EncodeWebp,
-): Promise<Encoding> {
+): Promise<{ title: string; options: SogOptions }> {
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
     measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK }));
   let palette = PALETTES[0];
@@ -67,8 +76,7 @@ async function tuned(
     title: `SOG version 2, steps ${Object.entries(steps)
       .map(([name, step]) => `${name} ${step.toPrecision(2)}`)
       .join(', ')}${cloud.shDegree > 0 ? `, palette ${palette}` : ''}`,
-    hasOneDegree: true,
-    write: (reduced) => writeSog(reduced.cloud, { steps, palette, encodeWebp }),
+    options: { steps, palette, encodeWebp },
   };
 }
 

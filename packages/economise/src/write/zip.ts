@@ -84,3 +84,16 @@ function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number]
     [2, 0],
   ];
 }
+
+/** The files of an archive that {@link writeZip} made, by their names. */
+export function filesOfZip(zip: Uint8Array): Map<string, Uint8Array> {
+  const view = new DataView(zip.buffer, zip.byteOffset, zip.byteLength);
+  const files = new Map<string, Uint8Array>();
+  for (let at = 0; view.getUint32(at, true) === LOCAL;) {
+    const [length, nameLength] = [view.getUint32(at + 22, true), view.getUint16(at + 26, true)];
+    const first = at + 30 + nameLength;
+    files.set(new TextDecoder().decode(zip.subarray(at + 30, first)), zip.subarray(first, first + length));
+    at = first + length;
+  }
+  return files;
+}

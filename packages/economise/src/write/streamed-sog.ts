@@ -1,0 +1,162 @@
+import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
+import { packedOrder } from '@gaussian-splat/renderer';
+import { buildLevels, recentred, type SplatLevel } from '@gaussian-splat/renderer/stages';
+import { nothingToWrite, sogFiles, type SogOptions } from './sog.js';
+
+/** Name of the index. */
+const LOD_INDEX = 'lod-meta.json';
+/** Whether a file of this name is the index of a streamed scene. */
+export const isLodIndex = (name: string): boolean => /(^|[\\/])lod-meta\.json$/i.test(name);
+/** Splats of the coarsest level of a box: one chunk of the renderer, of which each coarser level has a quarter. */
+const CHUNK = 256;
+const KEPT = 4;
+/** Levels that a scene has at least where it has the splats, and splats of all coarsest levels together at most: more would delay the first frame. */
+const LEAST_LEVELS = 4;
+const MOST_COARSEST = 40_000;
+/** Splats of a file at most: it has to come whole before any of it is shown. */
+const FILE_SPLATS = 131_072;
+
+/** A part of the scene: neighbours, and what stands for them from afar. */
+interface Box {
+  /** Indices in the cloud. */
+  readonly kept: Uint32Array;
+  /** The finest first. */
+  readonly levels: readonly SplatLevel[];
+}
+
+interface Run {
+  readonly file: number;
+  readonly offset: number;
+  readonly count: number;
+}
+
+/**
+ * Writes streamed SOG: an index, `lod-meta.json`, and SOG files of some boxes at one level of detail each. Each level has a quarter of the splats of the one before.
+ * @returns files by their paths; the index is the last
+ * @throws GaussianSplatError `argument/cloud` for a scene without a splat that can be drawn
+ */
+export async function writeStreamedSog(
+  given: GaussianCloud,
+  options: SogOptions,
+): Promise<ReadonlyMap<string, Uint8Array>> {
+  const cloud = recentred(given);
+  const order = packedOrder(cloud);
+  if (order.length === 0) throw nothingToWrite();
+  const boxes = boxesOf(cloud, order);
+  const lodLevels = Math.max(...boxes.map(({ levels }) => levels.length));
+  const files = new Map<string, Uint8Array>();
+  const filenames: string[] = [];
+  const lods: Record<string, Run>[] = boxes.map(() => ({}));
+  for (let level = 0; level < lodLevels; level++) {
+    for (const [k, group] of groupsOf(boxes, level).entries()) {
+      let offset = 0;
+      for (const box of group) {
+        const { count } = boxes[box].levels[level];
+        lods[box][level] = { file: filenames.length, offset, count };
+        offset += count;
+      }
+      const parts = group.map((box) => boxes[box]);
+      const part =
+        level === 0
+          ? cloud
+          : cloudOf(
+              parts.map(({ levels }) => levels[level]),
+              cloud,
+            );
+      const kept =
+        level === 0 ? joined(parts.map((box) => box.kept)) : Uint32Array.from({ length: offset }, (_, i) => i);
+      const folder = `${level}_${k}`;
+      filenames.push(`${folder}/meta.json`);
+      for (const [name, bytes] of await sogFiles(part, kept, options)) files.set(`${folder}/${name}`, bytes);
+    }
+  }
+  const children = boxes.map(({ kept }, box) => ({ bound: boundOf(cloud, kept), lods: lods[box] }));
+  const index = { lodLevels, environment: null, filenames, tree: { bound: boundOf(cloud, order), children } };
+  return files.set(LOD_INDEX, new TextEncoder().encode(JSON.stringify(index)));
+}
+
+/** Boxes of as many splats each, give or take one, so that all have the same levels. */
+function boxesOf(cloud: GaussianCloud, order: Uint32Array): Box[] {
+  let most = CHUNK * KEPT ** (LEAST_LEVELS - 1);
+  while ((order.length * CHUNK) / most > MOST_COARSEST) most *= KEPT;
+  const count = Math.ceil(order.length / most);
+  return Array.from({ length: count }, (_, box) => {
+    const [first, end] = [box, box + 1].map((k) => Math.floor((k * order.length) / count));
+    const kept = order.slice(first, end);
+    return { kept, levels: buildLevels(cloud, kept) };
+  });
+}
+
+/** Boxes whose splats of a level lie in one file. */
+function groupsOf(boxes: readonly Box[], level: number): number[][] {
+  const groups: number[][] = [];
+  let splats = Infinity;
+  boxes.forEach(({ levels }, box) => {
+    if (level >= levels.length) return;
+    const { count } = levels[level];
+    if (splats + count > FILE_SPLATS) {
+      groups.push([]);
+      splats = 0;
+    }
+    groups[groups.length - 1].push(box);
+    splats += count;
+  });
+  return groups;
+}
+
+function joined(parts: readonly Uint32Array[]): Uint32Array {
+  const all = new Uint32Array(parts.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const part of parts) {
+    all.set(part, at);
+    at += part.length;
+  }
+  return all;
+}
+
+/** Levels one after the other as a cloud; opacities above 1, which merged splats have, are 1. */
+function cloudOf(levels: readonly SplatLevel[], like: GaussianCloud): GaussianCloud {
+  const count = levels.reduce((sum, level) => sum + level.count, 0);
+  const [positions, scales] = [new Float32Array(3 * count), new Float32Array(3 * count)];
+  const [rotations, opacities] = [new Float32Array(4 * count), new Float32Array(count)];
+  const stride = 3 * shCoefficientCount(like.shDegree);
+  const sh = new Float32Array(stride * count);
+  let at = 0;
+  for (const level of levels) {
+    positions.set(level.positions, 3 * at);
+    level.readSh(0, level.count, sh.subarray(stride * at));
+    for (let i = 0; i < level.count; i++, at++) {
+      const { values, vectors } = symmetricEigen(covarianceOf(level.factors, 6 * i));
+      for (let n = 0; n < 3; n++) scales[3 * at + n] = Math.sqrt(Math.max(LEAST_VARIANCE, values[n]));
+      rotations.set(quaternionOfMatrix(vectors), 4 * at);
+      opacities[at] = Math.min(1, level.opacities[i]);
+    }
+  }
+  return { ...like, count, positions, scales, rotations, opacities, sh };
+}
+
+/** A float32 has a square of it. */
+const LEAST_VARIANCE = 1e-36;
+
+/** @param factors lower triangular roots: xx, yx, yy, zx, zy, zz */
+function covarianceOf(factors: Float32Array, at: number): number[] {
+  const [xx, yx, yy, zx, zy, zz] = factors.subarray(at, at + 6);
+  const [xy, xz, yz] = [xx * yx, xx * zx, yx * zx + yy * zy];
+  return [xx * xx, xy, xz, xy, yx * yx + yy * yy, yz, xz, yz, zx * zx + zy * zy + zz * zz];
+}
+
+/** The box of the centres, world units. */
+function boundOf({ positions, origin }: GaussianCloud, kept: Uint32Array): { min: number[]; max: number[] } {
+  const [min, max] = [
+    [Infinity, Infinity, Infinity],
+    [-Infinity, -Infinity, -Infinity],
+  ];
+  for (const i of kept) {
+    for (let axis = 0; axis < 3; axis++) {
+      const value = positions[3 * i + axis] + origin[axis];
+      min[axis] = Math.min(min[axis], value);
+      max[axis] = Math.max(max[axis], value);
+    }
+  }
+  return { min, max };
+}
