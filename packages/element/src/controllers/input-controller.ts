@@ -189,8 +189,13 @@ export class InputController implements ReactiveController {
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
     if (!other && from.owner === 'undecided') return this.#decide(event, from, to);
     this.#pointers.set(event.pointerId, { ...from, ...to });
-    if (other) this.#movePair([from, other], [to, other], height);
-    else if (from.owner === 'camera') this.#perform(from.pans ? panOf(from, to, height) : orbitOf(from, to, height));
+    const actions = other
+      ? this.#ofPair([from, other], [to, other], height)
+      : from.owner === 'camera'
+        ? [from.pans ? panOf(from, to, height) : orbitOf(from, to, height)]
+        : [];
+    // A carousel around the scene learns so that the drag is not its own. The browser does nothing by itself on a move.
+    for (const action of actions) if (this.#perform(action)) event.preventDefault();
   }
 
   /** Finds out whose a finger is; its drag counts from here on, so that the camera does not jump. */
@@ -267,9 +272,8 @@ export class InputController implements ReactiveController {
     if (event.touches.length > 1 && event.cancelable && this.#of.input.zoom) event.preventDefault();
   };
 
-  #movePair(from: readonly [Point, Point], to: readonly [Point, Point], height: number): void {
-    if (!this.#of.input.zoom) return;
-    for (const action of pinchOf(from, to, height)) this.#perform(action);
+  #ofPair(from: readonly [Point, Point], to: readonly [Point, Point], height: number): readonly CameraAction[] {
+    return this.#of.input.zoom ? pinchOf(from, to, height) : [];
   }
 
   /** Passes an action on; false if the page does not allow it. */
