@@ -8,6 +8,7 @@ import {
   devices,
   FIXTURES,
   frames,
+  gated,
   nextEvent,
   show,
   showLoaded,
@@ -232,14 +233,16 @@ describe('moves and removals', () => {
     const delayBefore = GaussianSplatElement.releaseDelay;
     GaussianSplatElement.releaseDelay = 0;
     try {
-      const element = show({ src: '/net/slow/compass.ply?ms=1500' });
+      const { src, open } = gated('compass.ply');
+      const element = show({ src });
       let events = 0;
       await nextEvent(element, 'progress');
       for (const type of ['progress', 'load', 'error']) element.addEventListener(type, () => events++);
       element.remove();
       await element.ready;
       events = 0;
-      await delay(1_800);
+      await open();
+      await delay(300);
       assertEqual([element.loaded, events], [false, 0], 'loaded, events');
     } finally {
       GaussianSplatElement.releaseDelay = delayBefore;

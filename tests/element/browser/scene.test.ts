@@ -7,6 +7,7 @@ import {
   delay,
   FIXTURES,
   frames,
+  gated,
   nextEvent,
   show,
   showLoaded,
@@ -69,11 +70,13 @@ describe('a scene', () => {
     const seen: string[] = [];
     const onBody = (event: Event): void => void seen.push(`bubbled ${event.type}`);
     for (const type of ['load', 'progress', 'error', 'camera-change']) document.body.addEventListener(type, onBody);
-    const element = show({ src: '/net/slow/compass.ply?ms=400' });
+    const { src, open } = gated('compass.ply');
+    const element = show({ src });
     const progress: ProgressEvent[] = [];
     element.addEventListener('progress', (event) => progress.push(event));
     element.addEventListener('load', (event) => seen.push(`load ${new URL(event.detail.url).pathname}`));
     await until(() => states(element).includes('loading'), 'the state loading');
+    await open();
     await element.ready;
     await frames();
     assertEqual(seen, ['load /net/slow/compass.ply']);
@@ -129,18 +132,17 @@ describe('a scene', () => {
     assert(context, 'a 2D canvas');
     context.fillStyle = 'rgb(255, 0, 0)';
     context.fillRect(0, 0, 4, 4);
-    const element = show(
-      { src: '/net/slow/green.splat?ms=2500', poster: image.toDataURL() },
-      'width: 120px; height: 100px; --poster-transition: 0s',
-    );
+    const { src, open } = gated('green.splat');
+    const element = show({ src, poster: image.toDataURL() }, 'width: 120px; height: 100px; --poster-transition: 0s');
     await until(() => states(element).includes('loading'), 'the state loading');
     const bar = element.shadowRoot?.querySelector('[role=progressbar]');
     assert(bar && !bar.hasAttribute('aria-valuenow'), 'a progress bar without a value');
     // An image is decoded in its own time.
     let isSeen = false;
-    while (!isSeen && !element.loaded) isSeen = isRed((await screenOf(element)).at(60, 50));
-    assert(isSeen, 'the poster is seen before the scene');
+    for (let i = 0; i < 20 && !isSeen; i++) isSeen = isRed((await screenOf(element)).at(60, 50));
+    assert(isSeen && !element.loaded, 'the poster is seen before the scene');
     await until(() => Number(bar.getAttribute('aria-valuenow')) > 0, 'a value in the progress bar');
+    await open();
     await element.ready;
     await element.updateComplete;
     assert(isGreen((await screenOf(element)).at(60, 50)), 'the scene is seen');
@@ -216,9 +218,11 @@ describe('src', () => {
       { src: `${FIXTURES}green.splat` },
       'width: 120px; height: 100px; --poster-transition: 0s',
     );
-    element.src = '/net/slow/compass.ply?ms=2500';
+    const { src, open } = gated('compass.ply');
+    element.src = src;
     await until(() => states(element).includes('loading'), 'the state loading');
     assert(isGreen((await screenOf(element)).at(60, 50)), 'the old scene is seen');
+    await open();
     await element.ready;
     assertEqual(element.statistics?.splats, 6, 'splats');
   });

@@ -35,6 +35,18 @@ let lost = [];
 /** The end of a path whose answer waits. */
 let held = { file: '', ms: 0 };
 
+/** By name: what files wait for. */
+const gates = new Map();
+
+function gateOf(name) {
+  if (!gates.has(name)) {
+    let open;
+    const opened = new Promise((resolve) => (open = resolve));
+    gates.set(name, { opened, open });
+  }
+  return gates.get(name);
+}
+
 /** By folder: what tests have put there, and what was asked for. */
 const kept = new Map();
 
@@ -114,20 +126,28 @@ const ANSWERS = {
     context.body = '<!doctype html><title>Log in</title><p>Please log in.</p>';
   },
 
-  /** The file in eight pieces over `ms` milliseconds. */
+  /** The file in eight pieces over `ms` milliseconds; with a `gate`, the last of them when that is opened. */
   slow(context, name) {
     const bytes = readFileSync(join(fixtures, name));
-    const pause = Number(context.query.ms ?? 800) / 8;
+    const { ms, gate } = context.query;
+    const pause = Number(ms ?? (gate ? 0 : 800)) / 8;
     context.set('Content-Length', String(bytes.length));
     context.body = Readable.from(
       (async function* pieces() {
         const size = Math.ceil(bytes.length / 8);
         for (let at = 0; at < bytes.length; at += size) {
           await delay(pause);
+          if (gate && at + size >= bytes.length) await gateOf(gate).opened;
           yield bytes.subarray(at, at + size);
         }
       })(),
     );
+  },
+
+  /** Lets the last part of the files behind a gate through. */
+  open(context, gate) {
+    gateOf(gate).open();
+    context.status = 204;
   },
 
   /** A red ball of `n` splats, 4,000 unless said, of a `size` that hardly covers it unless said, in twelve pieces over `ms` milliseconds. */
