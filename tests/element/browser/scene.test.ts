@@ -13,7 +13,7 @@ import {
   showLoaded,
   until,
 } from './support/harness.js';
-import { isBlue, isGreen, isRed, screenOf } from './support/screen.js';
+import { comesToShow, isBlue, isGreen, isRed, screenOf } from './support/screen.js';
 
 const states = (element: GaussianSplatElement): string[] =>
   ['loading', 'ready', 'error', 'unsupported'].filter((state) => element.matches(`:state(${state})`));
@@ -58,7 +58,7 @@ describe('a scene', () => {
     let events = 0;
     for (const type of ['loadstart', 'emptied', 'load', 'error']) element.addEventListener(type, () => events++);
     element.quality = 'reference';
-    await until(() => bytes() > rounded, 'more exact colours', 10_000);
+    await until(() => bytes() > rounded, 'more exact colours', 30_000);
     assertEqual([bytes(), events, element.loaded], [asked.statistics?.bytes, 0, true], 'bytes, events, loaded');
     assertEqual(String(element.getCameraOrbit()), orbit, 'the camera');
     element.quality = 'default';
@@ -70,7 +70,7 @@ describe('a scene', () => {
     const seen: string[] = [];
     const onBody = (event: Event): void => void seen.push(`bubbled ${event.type}`);
     for (const type of ['load', 'progress', 'error', 'camera-change']) document.body.addEventListener(type, onBody);
-    const { src, open } = gated('compass.ply');
+    const { src, open } = gated('compass.ply', 400);
     const element = show({ src });
     const progress: ProgressEvent[] = [];
     element.addEventListener('progress', (event) => progress.push(event));
@@ -137,9 +137,7 @@ describe('a scene', () => {
     await until(() => states(element).includes('loading'), 'the state loading');
     const bar = element.shadowRoot?.querySelector('[role=progressbar]');
     assert(bar && !bar.hasAttribute('aria-valuenow'), 'a progress bar without a value');
-    // An image is decoded in its own time.
-    let isSeen = false;
-    for (let i = 0; i < 20 && !isSeen; i++) isSeen = isRed((await screenOf(element)).at(60, 50));
+    const isSeen = await comesToShow(element, (screen) => isRed(screen.at(60, 50)));
     assert(isSeen && !element.loaded, 'the poster is seen before the scene');
     await until(() => Number(bar.getAttribute('aria-valuenow')) > 0, 'a value in the progress bar');
     await open();
@@ -221,7 +219,8 @@ describe('src', () => {
     const { src, open } = gated('compass.ply');
     element.src = src;
     await until(() => states(element).includes('loading'), 'the state loading');
-    assert(isGreen((await screenOf(element)).at(60, 50)), 'the old scene is seen');
+    const isSeen = await comesToShow(element, (screen) => isGreen(screen.at(60, 50)));
+    assert(isSeen && !element.loaded, 'the old scene is seen');
     await open();
     await element.ready;
     assertEqual(element.statistics?.splats, 6, 'splats');

@@ -80,10 +80,10 @@ export function nextEvent<T extends Event>(target: EventTarget, type: string, li
 
 let gates = 0;
 
-/** A file of the fixtures whose last part comes when a test lets it: what is seen before is seen while it loads, however slow the machine is. */
-export function gated(file: string): { readonly src: string; open(): Promise<void> } {
+/** A file of the fixtures, in pieces over `ms` milliseconds, whose last part comes when a test lets it: what is seen before is seen while it loads, however slow the machine is. */
+export function gated(file: string, ms = 0): { readonly src: string; open(): Promise<void> } {
   const gate = `${Math.round(performance.timeOrigin)}-${++gates}`;
-  return { src: `/net/slow/${file}?gate=${gate}`, open: async () => void (await fetch(`/net/open/${gate}`)) };
+  return { src: `/net/slow/${file}?ms=${ms}&gate=${gate}`, open: async () => void (await fetch(`/net/open/${gate}`)) };
 }
 
 /** An element of 120 x 100 CSS pixels in the page. Every test's elements are removed after it. */

@@ -55,6 +55,16 @@ export async function screenOf(element: Element): Promise<Screen> {
   return new Screen(context.getImageData(0, 0, image.width, image.height), width);
 }
 
+/** Whether an element comes to show something: a picture is decoded, and a frame composed, in its own time. */
+export async function comesToShow(
+  element: Element,
+  isShown: (screen: Screen) => boolean,
+  tries = 20,
+): Promise<boolean> {
+  for (let i = 0; i < tries; i++) if (isShown(await screenOf(element))) return true;
+  return false;
+}
+
 export const isRed = ([r, g, b]: Rgb): boolean => r > 150 && g < 110 && b < 110;
 export const isGreen = ([r, g, b]: Rgb): boolean => g > 150 && r < 110 && b < 110;
 export const isBlue = ([r, g, b]: Rgb): boolean => b > 150 && r < 110 && g < 110;

@@ -130,7 +130,7 @@ const ANSWERS = {
   slow(context, name) {
     const bytes = readFileSync(join(fixtures, name));
     const { ms, gate } = context.query;
-    const pause = Number(ms ?? (gate ? 0 : 800)) / 8;
+    const pause = Number(ms ?? 800) / 8;
     context.set('Content-Length', String(bytes.length));
     context.body = Readable.from(
       (async function* pieces() {
