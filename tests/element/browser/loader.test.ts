@@ -5,12 +5,11 @@ import {
   claimComing,
   COMPASS,
   delay,
-  gated,
-  hurry,
   nextEvent,
   show,
   showLoaded,
   until,
+  hurry,
 } from './support/harness.js';
 
 /** All workers that the page has started, and whether they were ended. */
@@ -44,9 +43,10 @@ describe('the scene worker', () => {
   });
 
   it('that dies is an error of the elements it worked for, and the next load starts another', async () => {
-    const element = show({ src: gated('compass.ply').src });
+    const element = show({ src: '/net/slow/compass.ply?ms=3000' });
     await until(() => workers.some(({ isEnded }) => !isEnded), 'a worker');
     await nextEvent(element, 'progress');
+    await delay(600);
     const { worker } = workers[workers.length - 1];
     worker.dispatchEvent(new ErrorEvent('error', { message: 'out of memory', cancelable: true }));
     await element.ready;

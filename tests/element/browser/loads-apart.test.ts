@@ -7,8 +7,6 @@ import {
   COMPASS,
   delay,
   FIXTURES,
-  gated,
-  nextEvent,
   show,
   showLoaded,
   until,
@@ -145,13 +143,11 @@ describe('a worker that dies', () => {
   });
 
   it('without a word, while it loads: the load begins again in another', async () => {
-    const { src, open } = gated('compass.ply');
-    const element = show({ src });
-    await nextEvent(element, 'progress');
+    const element = show({ src: '/net/slow/compass.ply?ms=2500' });
+    await delay(800);
     Worker.prototype.terminate.call(living[0]);
     const time = await timeOf(() => showLoaded());
     assert(time < 3_000, `the next load took ${time.toFixed(0)} ms`);
-    await open();
     await element.ready;
     assertEqual([element.loaded, element.error], [true, null], 'the one that was under way');
   });
@@ -163,11 +159,9 @@ describe('a worker that dies', () => {
   });
 
   it('with an error, while several load: all begin again', async () => {
-    const files = [1, 2, 3].map(() => gated('compass.ply'));
-    const elements = files.map(({ src }) => show({ src }));
-    await Promise.all(elements.map((element) => nextEvent(element, 'progress')));
+    const elements = [1, 2, 3].map((i) => show({ src: `/net/slow/compass.ply?ms=2000&${i}` }));
+    await delay(600);
     living[0].dispatchEvent(new ErrorEvent('error', { message: 'out of memory', cancelable: true }));
-    await Promise.all(files.map(({ open }) => open()));
     await Promise.all(elements.map((element) => element.ready));
     assertEqual(
       elements.map(({ error }) => error),

@@ -9,7 +9,6 @@ import {
   COMPASS,
   delay,
   frames,
-  gated,
   nextEvent,
   show,
   showLoaded,
@@ -235,11 +234,9 @@ describe('hotspots', () => {
       await sendKeys({ press: 'Tab' });
       return getComputedStyle(button).visibility === 'hidden' && document.activeElement !== button;
     };
-    const { src, open } = gated('compass.ply');
-    const slow = show({ src });
+    const slow = show({ src: '/net/slow/compass.ply?ms=800' });
     const early = label(slow, 'early', '0m 0m 1m');
     assert(await isGone(slow, early), 'while the scene loads');
-    await open();
     await slow.ready;
     await frames();
     assertEqual(await isGone(slow, early), false, 'gone once the scene is there');
