@@ -29,9 +29,7 @@ interface Reflect {
   readonly WgslReflect: new (code: string) => Readonly<Record<'uniforms' | 'storage' | 'textures', Placed>>;
 }
 const scripts = '../../packages/element/scripts/';
-const { piecesIn, joinedIn, SHADER_FILES, shortShaders } = (await import(
-  `${scripts}shader-plugin.mjs`
-)) as Plugin;
+const { piecesIn, joinedIn, SHADER_FILES, shortShaders } = (await import(`${scripts}shader-plugin.mjs`)) as Plugin;
 const { shortened } = (await import(`${scripts}short-wgsl.mjs`)) as {
   shortened: (pieces: Map<string, string>, joined: readonly (readonly string[])[]) => Map<string, string>;
 };
