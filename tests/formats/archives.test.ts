@@ -125,7 +125,7 @@ test('directories that announce more than they hold are refused at once', async 
     const code = count > 1e5 ? 'decode/unsupported' : 'decode/corrupt';
     await expectRefusal(inZip64(ksplat, 'scene.ksplat', count), code, /found (1 of|4,000)/, { name: 'a.zip' });
   }
-  assert.ok(performance.now() - start < 5_000, `${performance.now() - start} ms`);
+  assert.ok(performance.now() - start < 1_000, `${performance.now() - start} ms`);
 });
 
 test('content that is not what was packed is refused by name', async () => {

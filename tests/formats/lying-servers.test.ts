@@ -219,9 +219,9 @@ names.forEach((name, k) => {
       (error: unknown) => (error instanceof GaussianSplatError ? error.code : `unnamed: ${String(error)}`),
     );
     assert.equal(found, outcome);
-    // Silence is borne four times for 30 s, with pauses of 1.75 s between: two seconds of this clock. What a busy machine adds is counted 60 times.
+    // Silence is borne four times for 30 s, with pauses of 1.75 s between; a machine that is busy counts as well.
     const took = performance.now() - start;
-    assert.ok(took < 1_200_000, `${Math.round(took)} ms`);
+    assert.ok(took < 400_000, `${Math.round(took)} ms`);
     assert.ok(requests <= 25, `${requests} requests`);
   });
 });

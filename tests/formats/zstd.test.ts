@@ -139,7 +139,7 @@ test('a few bytes that announce billions of copied bytes are refused at once', a
   ] as const) {
     const start = process.cpuUsage();
     await expectRefusal(sceneOfOpacities(bomb, 65_791), 'decode/corrupt', message);
-    assert.ok(process.cpuUsage(start).user < 5e6, 'refused within seconds of work');
+    assert.ok(process.cpuUsage(start).user < 1e6, 'refused within a second of work');
   }
 });
 

@@ -49,7 +49,7 @@ test('20,000 mutations: a header or a named error, the same in one piece and in 
   }
   assert.ok(refused > 2_000 && refused < 20_000, `${refused} refused`);
   const seconds = process.cpuUsage(start).user / 1e6;
-  assert.ok(seconds < 240, `${seconds} s of work`);
+  assert.ok(seconds < 60, `${seconds} s of work`);
 });
 
 /** Flips, replaces, inserts, removes or repeats bytes, mostly in the first and last 200, where the structure is. */
@@ -113,5 +113,5 @@ test('a file of 60 MB of empty fields is refused within seconds', async () => {
   const result = await outcome(bytes);
   assert.ok(result instanceof GaussianSplatError && result.code === 'decode/unsupported', String(result));
   const seconds = process.cpuUsage(start).user / 1e6;
-  assert.ok(seconds < 60, `${seconds} s of work`);
+  assert.ok(seconds < 20, `${seconds} s of work`);
 });
