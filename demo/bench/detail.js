@@ -103,7 +103,7 @@ async function measure() {
   const { manifest, scene, traffic } = await open(device);
   Object.assign(report, { splats: manifest.splats, pages: scene.progress.total });
   const renderer = new Renderer(device, { detailFade: number('fade', 0.5) });
-  report.levers = renderer.levers;
+  report.levers = renderer.resolvedSettings;
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.STORAGE_BINDING;
   const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage });
   const levers = { detail, splatBudget: splats };

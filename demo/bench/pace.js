@@ -35,7 +35,7 @@ const GAP_BEGINS = 8;
 
 /** The page's other work in a frame: beside the elements', and in the gap after it. */
 function work(burner, { stage, plan, now }) {
-  burner?.burn(now.burn * stage.elements[0].stats.pace.targetMs);
+  burner?.burn(now.burn * stage.elements[0].stats.dynamicQuality.targetMs);
   if (plan.warm > 0) setTimeout(() => burner.burn(plan.warm), GAP_BEGINS);
 }
 
@@ -53,7 +53,7 @@ async function resizeFor(load, bench) {
   const { stage, plan } = bench;
   const known = [];
   for (const side of CALIBRATION_SIDES) known.push(await wholeTimeAt(bench, side));
-  const target = stage.elements[0].stats.pace.targetMs;
+  const target = stage.elements[0].stats.dynamicQuality.targetMs;
   const most = (plan.most / Math.max(plan.width, plan.height)) ** 2 * plan.width * plan.height;
   return { known, side: Math.sqrt(pixelsFor(load * target, known, most) / (plan.width * plan.height)) };
 }

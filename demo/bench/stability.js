@@ -2,7 +2,7 @@
  * The page that draws rows of the stability catalogue with every subject. `?only=S7` runs one row, `?peers=0` ours alone, `?report=URL` is where
  * the figures are POSTed as JSON.
  */
-import { chooseVariants, deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
+import { autotune, deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle } from '../../tests/oracle/oracle.ts';
 import { OwnRenderer } from './run/own-renderer.js';
 import { openPeer } from './run/peer.js';
@@ -39,7 +39,7 @@ await sendReport(report, query.get('report'));
 async function run() {
   const adapter = await navigator.gpu.requestAdapter();
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
-  await chooseVariants(device);
+  await autotune(device);
   const subjects = query.get('peers') === '0' ? SUBJECTS.slice(0, 1) : SUBJECTS;
   addRow('th', ['row', 'reference', ...subjects.map(({ name }) => name)]);
   const rows = [];

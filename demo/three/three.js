@@ -1,6 +1,6 @@
 /** A captured skull in a three.js scene: a bar goes through it, a ring goes round it. */
 import { fetchScene, readScene } from '@gaussian-splat/formats';
-import { chooseVariants, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
+import { autotune, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { SplatRenderer, SplatScene } from '@gaussian-splat/three';
 import {
   BoxGeometry,
@@ -31,7 +31,7 @@ async function show() {
   const { device } = renderer.backend;
   // Without WebGPU three.js draws by WebGL, and the next line says what is wrong.
   const splats = new SplatRenderer(renderer, { onIncomplete: () => draw() });
-  await chooseVariants(device);
+  await autotune(device);
 
   const cloud = await readScene(await fetchScene('../scenes/skull.spz'));
   const skull = new SplatScene(await GaussianBuffers.upload(device, packGaussians(cloud)));

@@ -44,7 +44,7 @@ export async function draw(device, renderer, gaussians, camera, detail = 0) {
   const target = device.createTexture({ size: [width, height], format: 'rgba32float', usage });
   const splats = gaussians.pages.reduce((sum, page) => sum + 256 * Math.ceil(page.count / 256), 0);
   const contributions = device.createBuffer({ size: 4 * splats, usage: 0x80 | 0x4 });
-  do renderer.render({ gaussians, camera, target, detail, notes: { contributions } });
+  do renderer.render({ gaussians, camera, target, detail, auxiliary: { contributions } });
   while (!(await renderer.isComplete()));
   const { visible } = await renderer.statistics();
   const weights = await read(device, 4 * splats, (encoder, staging) =>

@@ -119,7 +119,7 @@ async function orderAges(attributes, milliseconds) {
       most,
       frames: sorted.length,
       perSecond,
-      moving: element.stats.pace.moving,
+      moving: element.stats.dynamicQuality.moving,
     });
   } finally {
     Object.assign(port, { postMessage });

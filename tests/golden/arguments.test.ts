@@ -15,7 +15,7 @@ const flat = Array.from(camera.worldToCamera, (x, k) => (k >= 4 && k < 8 ? camer
 const FAULTY: readonly (readonly [name: string, changes: object, code: string])[] = [
   ['no scene', { gaussians: undefined }, 'argument/value'],
   ['a list with a gap', { gaussians: [undefined] }, 'argument/value'],
-  ['levers that are null', { levers: null }, 'argument/value'],
+  ['levers that are null', { settings: null }, 'argument/value'],
   ['a background of three numbers', { background: [0, 0, 0] }, 'argument/value'],
   ['a background that is not a number', { background: [0, 0, NaN, 1] }, 'argument/value'],
   ['a matrix of columns', { camera: { ...camera, worldToCamera: columnMajor } }, 'argument/camera'],

@@ -1,4 +1,4 @@
-/** Levers of single frames: the same picture as of a renderer that has them for good, and nothing made on the way. */
+/** Settings of single frames: the same picture as of a renderer that has them for good, and nothing made on the way. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import {
@@ -6,7 +6,7 @@ import {
   packGaussians,
   Renderer,
   SpanTimer,
-  type FrameLevers,
+  type PerFrameSettings,
   type RasterizerName,
 } from '@gaussian-splat/renderer';
 import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
@@ -19,7 +19,7 @@ import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
 
-const MIXES: readonly Partial<FrameLevers>[] = [
+const MIXES: readonly Partial<PerFrameSettings>[] = [
   { depthKeyBits: 16, resolutionScale: 0.6, shDegree: 0 },
   { resolutionScale: 0.35, depthKeyBits: 16, transmittanceMin: 0.05 },
 ];
@@ -52,7 +52,7 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
     for (const levers of mixes) {
       const fixed = new Renderer(device, { rasterizer, ...levers });
       for (const camera of views) {
-        const mixed = await readFrame(device, own, { gaussians, camera, levers });
+        const mixed = await readFrame(device, own, { gaussians, camera, settings: levers });
         const expected = await readFrame(device, fixed, { gaussians, camera });
         assert.ok(
           mixed.some((value) => value > 0.1),
@@ -86,8 +86,8 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
       const original = device[name].bind(device) as (descriptor: never) => never;
       Object.assign(device, { [name]: (descriptor: never) => (made.push(name), original(descriptor)) });
     }
-    const draw = (levers?: Partial<FrameLevers>): void => {
-      for (const camera of views) renderer.render({ gaussians, camera, target, levers });
+    const draw = (levers?: Partial<PerFrameSettings>): void => {
+      for (const camera of views) renderer.render({ gaussians, camera, target, settings: levers });
     };
     draw();
     made.length = 0;
@@ -112,7 +112,7 @@ test('a smaller picture is enlarged the same by a compute shader as by drawing',
   const counter = countWork(device);
   const background = [0.1, 0.2, 0.3, 0.5] as const;
   for (const levers of MIXES) {
-    const request = { gaussians, camera: views[0], background, levers };
+    const request = { gaussians, camera: views[0], background, settings: levers };
     counter.take();
     const stored = await readFrame(device, tiles, request);
     assert.equal(counter.take().renderPasses, 0, 'stored');

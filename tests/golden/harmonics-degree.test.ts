@@ -40,7 +40,7 @@ for (const precision of ['int8', 'float16'] as const) {
       const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud, { sh: precision }));
       const renderer = new Renderer(device, { rasterizer: 'quads' });
       for (const shDegree of DEGREES) {
-        const pixels = await capture(device, renderer, { gaussians, camera, levers: { shDegree } });
+        const pixels = await capture(device, renderer, { gaussians, camera, settings: { shDegree } });
         const oracle = renderOracle(cutAt(cloud, shDegree), camera, { rules: 'gsplat', mode: 'classic' });
         const { psnr } = closeness(pixels, oracle);
         assert.ok(psnr >= 59, `up to degree ${shDegree}: ${psnr} dB`);

@@ -12,7 +12,7 @@ import {
   Viewpoint,
   World,
   type FrameSettings,
-  type Picture,
+  type FrameTarget,
 } from '@gaussian-splat/renderer';
 import { toCamera } from '../oracle/projection.js';
 import { randomSource } from '../support/gpu.js';
@@ -107,7 +107,7 @@ for (const how of BOTH) {
       texture.destroy();
     }
     const texture = target(device, 'rgba8unorm-srgb');
-    assert.throws(() => viewpoint.draw(camera, { target: texture, over: 'target' }), { where: 'Picture.colours' });
+    assert.throws(() => viewpoint.draw(camera, { target: texture, over: 'target' }), { where: 'FrameTarget.colours' });
     colours.destroy();
     viewpoint.destroy();
     scene.destroy();
@@ -197,16 +197,16 @@ test('bad requests are named', async () => {
     [
       'several samples',
       () => viewpoint.draw(camera, { target: texture('rgba8unorm', { sampleCount: 4 }) }),
-      'Picture.target',
+      'FrameTarget.target',
     ],
-    ['integers', () => viewpoint.draw(camera, { target: texture('rgba8uint') }), 'Picture.target'],
+    ['integers', () => viewpoint.draw(camera, { target: texture('rgba8uint') }), 'FrameTarget.target'],
     [
       'another size',
       () => viewpoint.draw(camera, { target: texture('rgba8unorm', { size: [8, 8] }) }),
-      'Picture.target',
+      'FrameTarget.target',
     ],
-    ['no target', () => viewpoint.draw(camera, {} as Picture), 'Picture.target'],
-    ['a view without its format', () => viewpoint.draw(camera, { target: {} as GPUTexture }), 'Picture.target'],
+    ['no target', () => viewpoint.draw(camera, {} as FrameTarget), 'FrameTarget.target'],
+    ['a view without its format', () => viewpoint.draw(camera, { target: {} as GPUTexture }), 'FrameTarget.target'],
     ['depth of several samples', () => host(texture('depth32float', { sampleCount: 4 })), 'HostDepth.texture'],
     ['depth in colours', () => host(texture('rgba8unorm')), 'HostDepth.texture'],
     ['depth that nobody may read', () => host(texture('depth32float', { usage: 0x10 })), 'HostDepth.texture'],

@@ -43,7 +43,7 @@ async function notesOf(device: GPUDevice, cloud: GaussianCloud, cameras: readonl
   const depth = device.createTexture({ size: [width, height], format: 'r32float', usage });
   const images: Float32Array[] = [];
   for (const camera of cameras) {
-    images.push(await readFrame(device, renderer, { gaussians, camera, notes: { contributions, depth } }));
+    images.push(await readFrame(device, renderer, { gaussians, camera, auxiliary: { contributions, depth } }));
   }
   const noted = { weights: await readBuffer(device, contributions), depths: await readBuffer(device, depth) };
   const plain = await readFrame(device, renderer, { gaussians, camera: cameras.at(-1)! });
@@ -96,7 +96,7 @@ test('depth is that of the splat at which a pixel becomes half transparent', asy
   assert.ok(depths.filter((depth) => depth > 0).length > depths.length / 4, 'hardly a pixel has a depth');
 });
 
-test('quads refuse to take notes, by name', async () => {
+test('quads refuse auxiliary outputs, by name', async () => {
   const device = await serialDevice();
   const { cloud, cameras } = room();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
@@ -106,9 +106,9 @@ test('quads refuse to take notes, by name', async () => {
     format: 'rgba8unorm',
     usage: 0x10,
   });
-  assert.throws(() => renderer.render({ gaussians, camera: cameras[0], target, notes: {} }), {
+  assert.throws(() => renderer.render({ gaussians, camera: cameras[0], target, auxiliary: {} }), {
     code: 'unsupported/limits',
-    where: 'Picture.notes',
+    where: 'FrameTarget.auxiliary',
   });
   renderer.destroy();
   gaussians.destroy();

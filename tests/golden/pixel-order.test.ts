@@ -189,7 +189,7 @@ test('what does not fit is refused by name', async () => {
   const viewpoint = new Viewpoint(device, new World(), { settings: { order: 'pixel' } });
   assert.equal(viewpoint.rasterizer, 'tiles');
   const target = device.createTexture({ size: [view.width, view.height], format: 'rgba8unorm', usage: 0x10 });
-  assert.throws(() => viewpoint.draw(view, { target, notes: {} }), { where: 'Picture.notes' });
+  assert.throws(() => viewpoint.draw(view, { target, auxiliary: {} }), { where: 'FrameTarget.auxiliary' });
   viewpoint.destroy();
   target.destroy();
 });

@@ -4,7 +4,7 @@ import { after, test } from 'node:test';
 import { setTimeout as delay } from 'node:timers/promises';
 import {
   capture,
-  chooseVariants,
+  autotune,
   createRenderer,
   GaussianBuffers,
   packGaussians,
@@ -66,7 +66,7 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
   const store = storeOf(entries);
   const first = await adapter.requestDevice();
   performance.clearMeasures();
-  const chosen = await chooseVariants(first, { store, pause: () => delay(20) });
+  const chosen = await autotune(first, { store, pause: () => delay(20) });
   await assertSuits(first, chosen);
   const [search] = performance.getEntriesByName('gaussian-splat.search') as PerformanceMeasure[];
   const { paused } = search.detail as { paused: number };
@@ -79,17 +79,17 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
       ? { ...chosen, threads: 'parallel' }
       : { ...chosen, rasterizer: chosen.rasterizer === 'tiles' ? 'quads' : 'tiles' };
   entries.set(key, JSON.stringify(other));
-  assert.deepEqual(await chooseVariants(await newDevice(), { store }), other);
+  assert.deepEqual(await autotune(await newDevice(), { store }), other);
   assert.equal(performance.getEntriesByName('gaussian-splat.search').length, 1, 'what is kept is not searched for');
   for (const damage of ['{', 'null', '{"rasterizer":"crayons"}']) {
     entries.set(key, damage);
     const device = await newDevice();
-    const anew = await chooseVariants(device, { store });
+    const anew = await autotune(device, { store });
     await assertSuits(device, anew);
     assert.deepEqual(JSON.parse(entries.get(key)!), anew, damage);
     const renderer = await createRenderer(device);
-    assert.equal(renderer.levers.threads, anew.threads);
-    assert.equal(renderer.levers.rasterizer, anew.rasterizer);
+    assert.equal(renderer.resolvedSettings.threads, anew.threads);
+    assert.equal(renderer.resolvedSettings.rasterizer, anew.rasterizer);
     renderer.destroy();
     device.destroy();
   }
@@ -98,7 +98,7 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
 test('a device that is lost while variants are tried leaves the choice for its adapter as it was', async () => {
   const entries = new Map<string, string>();
   const store = storeOf(entries);
-  const chosen = await chooseVariants(await newDevice(), { store });
+  const chosen = await autotune(await newDevice(), { store });
   const [[key, kept]] = entries;
   for (const [moment, isKnown, milliseconds] of [
     ['before the first trial', true, 0],
@@ -108,7 +108,7 @@ test('a device that is lost while variants are tried leaves the choice for its a
     entries.clear();
     if (isKnown) entries.set(key, kept);
     const device = await deviceLikeAny();
-    const choosing = chooseVariants(device, { store });
+    const choosing = autotune(device, { store });
     if (milliseconds > 0) await new Promise((resolve) => setTimeout(resolve, milliseconds));
     device.destroy();
     await choosing;
@@ -116,7 +116,7 @@ test('a device that is lost while variants are tried leaves the choice for its a
   }
   // Trials that are made anew may end otherwise on a GPU that has other things to do; what was kept counts.
   entries.set(key, kept);
-  assert.deepEqual(await chooseVariants(await newDevice(), { store }), chosen);
+  assert.deepEqual(await autotune(await newDevice(), { store }), chosen);
 });
 
 /** A device whose adapter does not say that it is a processor. */
@@ -142,11 +142,11 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   device.createComputePipeline = (descriptor) => (pipelines++, make(descriptor));
   const begun = await startVariants(device, { store, quickMs: Infinity });
   assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' });
-  assert.equal(new Renderer(device).levers.rasterizer, 'tiles');
+  assert.equal(new Renderer(device).resolvedSettings.rasterizer, 'tiles');
   assert.equal(entries.size, 0, 'nothing that was not measured is kept');
   const atFirst = pipelines;
   const pauses: (() => void)[] = [];
-  const choosing = chooseVariants(device, { store, pause: () => new Promise((resolve) => pauses.push(resolve)) });
+  const choosing = autotune(device, { store, pause: () => new Promise((resolve) => pauses.push(resolve)) });
   await new Promise((resolve) => setTimeout(resolve, 200));
   assert.equal(pauses.length, 1);
   assert.equal(pipelines, atFirst, 'nothing goes on before the pause');
@@ -155,14 +155,14 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   clearInterval(letGo);
   await assertSuits(device, chosen);
   assert.deepEqual(JSON.parse([...entries.values()][0]), chosen);
-  assert.equal(new Renderer(device).levers.rasterizer, chosen.rasterizer);
+  assert.equal(new Renderer(device).resolvedSettings.rasterizer, chosen.rasterizer);
   assert.ok(pipelines > atFirst);
   device.destroy();
 
   const later = await deviceLikeAny();
   const pause = () => assert.fail('nothing is looked for');
   assert.deepEqual(await startVariants(later, { store, quickMs: 0, pause }), chosen, 'what an earlier visit found');
-  assert.deepEqual(await chooseVariants(later, { store, pause }), chosen);
+  assert.deepEqual(await autotune(later, { store, pause }), chosen);
   later.destroy();
 });
 
@@ -173,7 +173,7 @@ test('what is likely is not drawn with where it is slow', { skip: onlyInFull }, 
     void startVariants(device, { store: null, quickMs: 0, pause });
   });
   await isLookedFor;
-  assert.equal(new Renderer(device).levers.rasterizer, 'quads', 'what works everywhere, until that is found');
+  assert.equal(new Renderer(device).resolvedSettings.rasterizer, 'quads', 'what works everywhere, until that is found');
   device.destroy();
 });
 

@@ -14,7 +14,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import {
   capture,
-  chooseVariants,
+  autotune,
   createRenderer,
   GaussianBuffers,
   packGaussians,
@@ -56,7 +56,7 @@ async function drawAsChosen(device: GPUDevice): Promise<number> {
 for (const { name, fault, expected } of sized(FAULTS.slice(1), FAULTS)) {
   test(name, async () => {
     const { device, befallen } = await faultyDevice([fault]);
-    const chosen = await chooseVariants(device, { store: null });
+    const chosen = await autotune(device, { store: null });
     assert.ok(befallen.length > 0, 'the shader was broken');
     for (const [lever, value] of Object.entries(expected)) assert.equal(chosen[lever as keyof Variants], value, lever);
     holds('S16', `${name}: the variant that takes over`, await drawAsChosen(device), { atLeast: 59, unit: 'dB' });
@@ -68,7 +68,7 @@ fullTest('a choice that was kept from an earlier visit is tried again, and dropp
   const { device } = await faultyDevice([FAULTS[1].fault]);
   const kept = JSON.stringify({ rasterizer: 'quads', accumulation: 'rgba16float', threads: 'parallel' });
   const store = { getItem: () => kept, setItem: () => undefined };
-  assert.equal((await chooseVariants(device, { store })).rasterizer, 'tiles');
+  assert.equal((await autotune(device, { store })).rasterizer, 'tiles');
   device.destroy();
 });
 
@@ -76,7 +76,7 @@ test('matrices transposed in every variant: an error, not a wrong picture', asyn
   const { device, befallen } = await faultyDevice([
     { shader: /gs\./, from: 'return to_camera * (', to: 'return transpose(to_camera) * (' },
   ]);
-  await assert.rejects(chooseVariants(device, { store: null }), { code: 'unsupported/wrong-image' });
+  await assert.rejects(autotune(device, { store: null }), { code: 'unsupported/wrong-image' });
   await assert.rejects(
     createRenderer(device),
     { code: 'unsupported/wrong-image' },

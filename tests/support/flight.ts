@@ -40,7 +40,7 @@ export interface FlightOptions {
   /** Bytes of files that are kept, and whether copies of a tree have files of their own, as no folder has them: such a scene is one without copies. */
   readonly kept: number;
   readonly isWithoutCopies?: boolean;
-  /** Wishes are those of the present view alone. */
+  /** Page requests are those of the present view alone. */
   readonly isStill?: boolean;
 }
 

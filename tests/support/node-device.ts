@@ -1,5 +1,5 @@
 /** A device of Dawn in Node. Tests that use it run under `gpuEnvironment()` of scripts/lib. */
-import { chooseVariants } from '@gaussian-splat/renderer';
+import { autotune } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { isFull } from './extent.js';
 
@@ -26,7 +26,7 @@ export async function asOnSwiftShader(device: GPUDevice): Promise<GPUDevice> {
     threads: 'serial',
     sort: 'serial',
   });
-  await chooseVariants(device, { store: { getItem: () => choice, setItem: () => undefined } });
+  await autotune(device, { store: { getItem: () => choice, setItem: () => undefined } });
   return device;
 }
 

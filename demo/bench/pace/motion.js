@@ -26,7 +26,7 @@ export async function move(stage, seconds, { speed, onFrame = () => undefined })
 
 /** `span` is what a frame took, ms from when it could begin until the GPU was done, where one has become known since the last look; null where none has. */
 function readPace(element, lastOf) {
-  const { moving, drawn, targetMs, lastMs } = element.stats?.pace ?? {};
+  const { moving, drawn, targetMs, lastMs } = element.stats?.dynamicQuality ?? {};
   const isNew = lastMs !== null && lastOf.has(element) && lastMs !== lastOf.get(element);
   lastOf.set(element, lastMs);
   return { moving, drawn, target: targetMs, span: isNew ? lastMs : null };

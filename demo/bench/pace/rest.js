@@ -33,7 +33,7 @@ export async function comeToRest(stage, { compares }) {
   const { done, shown } = await trueImages(elements);
   await wait(300);
   const wholeMs = quantile(
-    elements.map(({ stats }) => stats.pace.lastMs ?? NaN),
+    elements.map(({ stats }) => stats.dynamicQuality.lastMs ?? NaN),
     0.5,
   );
   const picture = compares && shown !== undefined ? await compareWithBlob(elements[0], shown) : undefined;
@@ -46,7 +46,7 @@ export async function comeToRest(stage, { compares }) {
  * element's, so this one is asked for again and again
  */
 async function trueImages(elements) {
-  const isWhole = ({ stats }) => stats.pace.drawn === 'whole';
+  const isWhole = ({ stats }) => stats.dynamicQuality.drawn === 'whole';
   const canvas = elements[0].shadowRoot.querySelector('canvas');
   const end = performance.now() + LIMIT;
   let shown;

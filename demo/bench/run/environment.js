@@ -1,5 +1,5 @@
 /** The device to measure on, and everything about it that a reader of the figures needs. */
-import { chooseVariants, deviceDescriptor } from '@gaussian-splat/renderer';
+import { autotune, deviceDescriptor } from '@gaussian-splat/renderer';
 
 /** Set by the build: the project's version and commit, and the versions of the peers. */
 const VERSIONS = typeof BENCH_VERSIONS === 'undefined' ? {} : BENCH_VERSIONS;
@@ -17,7 +17,7 @@ export async function openDevice() {
   const features = new Set([...(descriptor.requiredFeatures ?? []), ...(canTime ? ['timestamp-query'] : [])]);
   const device = await adapter.requestDevice({ ...descriptor, requiredFeatures: [...features] });
   // What `auto` means, as the element would find out; never from an earlier visit.
-  const variants = await chooseVariants(device, { store: null });
+  const variants = await autotune(device, { store: null });
   const errors = [];
   const note = (message) => errors.length < 20 && errors.push(message.slice(0, 300));
   device.addEventListener('uncapturederror', ({ error }) => note(error.message));

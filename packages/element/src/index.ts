@@ -15,9 +15,9 @@ export type {
 } from './events.js';
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
 export type { SceneStats } from './stats.js';
-export type { PaceReport } from './controllers/pace-controller.js';
+export type { DynamicQualityReport } from './controllers/pace-controller.js';
 export type { SettableProperties } from './media.js';
-export type { PictureOptions } from './viewing.js';
+export type { ImageOptions } from './viewing.js';
 export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './views/camera-view.js';
 export type { Easing } from './views/path.js';
 export type { NamedView } from './views/read-views.js';
@@ -38,7 +38,7 @@ export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';
 export { SceneTimeRanges } from './time-ranges.js';
 export type { GeneratorInput } from './live/inputs.js';
-export type { ControlValues, Numbers, Picture, Pictures } from './live/values.js';
+export type { ControlValues, Numbers, ImageSource, ImageSources } from './live/values.js';
 export type { SceneLimits } from './loading/protocol.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 

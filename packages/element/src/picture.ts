@@ -2,7 +2,7 @@
 import type { PixelSize } from './controllers/size-controller.js';
 import type { ViewController } from './controllers/view-controller.js';
 import { wasLost } from './gpu/device-failures.js';
-import type { PictureOptions } from './viewing.js';
+import type { ImageOptions } from './viewing.js';
 
 export interface PictureHost {
   readonly element: HTMLElement;
@@ -19,7 +19,7 @@ export type Rgba = readonly [red: number, green: number, blue: number, alpha: nu
 /** Why there is no picture of a device that is lost. */
 const LOST = 'The GPU device was lost before the image was drawn: take it again after the event contextrestored';
 
-export async function takePicture(host: PictureHost, options: PictureOptions): Promise<Blob> {
+export async function takePicture(host: PictureHost, options: ImageOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
   const { painter } = host.view;
   const pixels = painter && sizeOf(options, host.canvas, painter.device.limits.maxTextureDimension2D);
@@ -44,7 +44,7 @@ export const nothingToDraw = (): DOMException =>
   );
 
 /** One side alone keeps the shape of the element. null without either. */
-function sizeOf({ width, height }: PictureOptions, canvas: HTMLCanvasElement | null, most: number): PixelSize | null {
+function sizeOf({ width, height }: ImageOptions, canvas: HTMLCanvasElement | null, most: number): PixelSize | null {
   if (canvas === null || (width === undefined && height === undefined)) return null;
   const aspect = canvas.width / canvas.height;
   const size = { width: Math.round(width ?? height! * aspect), height: Math.round(height ?? width! / aspect) };

@@ -145,7 +145,7 @@ export class Stage
     if (shown.length === 0) return null;
     return statsOf(shown, {
       quality: this.attributes.quality,
-      pace: this.view.pace.report,
+      dynamicQuality: this.view.pace.report,
       counts: this.#counts,
       isPreview: this.scene.isPreview,
       frameBytes: this.view.painter?.byteLength ?? 0,

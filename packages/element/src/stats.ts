@@ -1,6 +1,6 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import type { QualityChoice } from './attributes.js';
-import type { PaceReport } from './controllers/pace-controller.js';
+import type { DynamicQualityReport } from './controllers/pace-controller.js';
 import type { SceneState } from './controllers/scene-controller.js';
 import type { ElementError } from './errors.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
@@ -31,7 +31,7 @@ export interface SceneStats {
   /** The attribute `quality`. */
   readonly quality: QualityChoice;
   /** What frames at rest and in motion are drawn with. */
-  readonly pace: PaceReport;
+  readonly dynamicQuality: DynamicQualityReport;
   /** The direction of the scene's frame that its file says points up, of length 1; null where it says nothing. Of several scenes that of the first. */
   readonly up: Vector3 | null;
   /** What of the files is not drawn, or may mean something else than what is drawn, for readers; the console has it, too. */
@@ -70,7 +70,7 @@ export interface ReadCounts {
 /** What is known besides the scene. */
 export interface StatsContext {
   readonly quality: QualityChoice;
-  readonly pace: PaceReport;
+  readonly dynamicQuality: DynamicQualityReport;
   readonly counts: ReadCounts | undefined;
   readonly isPreview: boolean;
   /** Bytes of GPU memory that frames are drawn with. */
@@ -82,7 +82,7 @@ export interface StatsContext {
 /** Puts together what is known without asking the GPU. */
 export function statsOf(
   scenes: readonly LoadedGaussians[],
-  { quality, pace, counts, isPreview, frameBytes, pixels = 0 }: StatsContext,
+  { quality, dynamicQuality, counts, isPreview, frameBytes, pixels = 0 }: StatsContext,
 ): SceneStats {
   const sum = (of: (scene: LoadedGaussians) => number | undefined): number =>
     scenes.reduce((total, scene) => total + (of(scene) ?? 0), 0);
@@ -103,7 +103,7 @@ export function statsOf(
       frames: frameBytes,
     },
     quality,
-    pace,
+    dynamicQuality,
     up: scenes[0]?.bounds.up ?? null,
     warnings: scenes.flatMap(({ warnings }) => warnings),
     scenes: [],
@@ -111,7 +111,7 @@ export function statsOf(
       ...whyPreview(isPreview),
       ...whyDropped(dropped),
       ...whyDetail(quality, detail),
-      ...whyPace(quality, pace),
+      ...whyPace(quality, dynamicQuality),
       ...whyLeft(counts?.left ?? 0),
     ],
   };
@@ -136,7 +136,7 @@ function whyLeft(left: number): string[] {
   return left > 0 ? [`${left} splats are not drawn: the GPU allows no buffer that holds more of them.`] : [];
 }
 
-function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: PaceReport): string[] {
+function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: DynamicQualityReport): string[] {
   if (quality !== 'auto') return quality === 'default' ? [] : [`The page asks for quality="${quality}".`];
   if (moving === 'whole') return [];
   const found = frameMs === null ? '' : `; the last took ${frameMs.toFixed(1)} ms`;

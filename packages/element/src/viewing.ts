@@ -7,7 +7,7 @@ import type { CameraView } from './views/camera-view.js';
 import type { FlightOptions, PathOptions } from './views/tour.js';
 
 /** An image to take. */
-export interface PictureOptions {
+export interface ImageOptions {
   /** Default `image/png`. */
   readonly mimeType?: string;
   /** 0..1, for formats that lose some. */
@@ -134,7 +134,7 @@ export abstract class ViewingMethods extends MediaProperties {
    * @returns rejects with an `InvalidStateError` where no scene is shown, or the element has no size; with a `RangeError` for a size that the GPU
    * cannot draw, and a `TypeError` for a background that is no colour.
    */
-  async toBlob(options: PictureOptions = {}): Promise<Blob> {
+  async toBlob(options: ImageOptions = {}): Promise<Blob> {
     const { takePicture } = await loadModule('the code for images', () => import('./picture.js'));
     this.applyAttributes();
     return takePicture(this.stage, options);

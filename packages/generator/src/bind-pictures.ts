@@ -50,7 +50,7 @@ function dimsFor({ dims: sizes = [] }: OnnxTensor, dims: readonly number[]): num
 }
 
 /** What an input of the role `image` takes: planes, images, and sizes as far as the file fixes them. */
-export function pictureShapeOf({ dims = [], dtype }: OnnxTensor): {
+export function imageShapeOf({ dims = [], dtype }: OnnxTensor): {
   readonly width: number | undefined;
   readonly height: number | undefined;
   readonly dtype: 'float32' | 'float16';

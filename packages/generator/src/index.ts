@@ -1,5 +1,5 @@
 export { bindInputs } from './bind-inputs.js';
-export { pictureShapeOf } from './bind-pictures.js';
+export { imageShapeOf } from './bind-pictures.js';
 export { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
 export { groupInstances, inputsOfInstances, stackInputs } from './batch/stack-inputs.js';
 export {
@@ -20,7 +20,7 @@ export {
   type MakeSink,
 } from './gaussian-models.js';
 export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputValue } from './input-value.js';
-export { PostProcessor, type FinishedPicture, type PictureInput, type PostProcessorOptions } from './post-processor.js';
+export { PostProcessor, type FinishedImage, type ImageInput, type PostProcessorOptions } from './post-processor.js';
 export { GeneratorSession } from './runtime/generator-session.js';
 export { answerCpuRun, type CpuRunMessage, type StartWorker } from './proof/run-on-cpu.js';
 export { compareParts, isDifferent, type ComparedPart, type Comparison } from './proof/compare.js';

@@ -1,6 +1,6 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core';
 import { Chain } from './chain/chain.js';
-import { pictureShapeOf } from './bind-pictures.js';
+import { imageShapeOf } from './bind-pictures.js';
 import { sameInputs, type GpuTensor, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
 import type { SessionKind } from './runtime/live-session.js';
@@ -9,16 +9,16 @@ import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
 /** The input that takes the image. */
-export type PictureInput = ReturnType<typeof pictureShapeOf> & { readonly name: string };
+export type ImageInput = ReturnType<typeof imageShapeOf> & { readonly name: string };
 
 /** An image that a model has made, on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
-export type FinishedPicture = GpuTensor & { readonly dtype: 'float32' | 'float16' };
+export type FinishedImage = GpuTensor & { readonly dtype: 'float32' | 'float16' };
 
 export interface PostProcessorOptions extends AcquireOptions {
   /**
    * Takes the finished image, [1,3,H,W]. It must submit its work before it returns: afterwards the buffer is the runtime's again.
    */
-  readonly onPicture: (picture: FinishedPicture) => void;
+  readonly onPicture: (picture: FinishedImage) => void;
   /** A run failed. The next request tries again. */
   readonly onError?: (error: unknown) => void;
 }
@@ -37,7 +37,7 @@ interface Wish {
  */
 export class PostProcessor {
   /** The input that takes the image. */
-  readonly input: PictureInput;
+  readonly input: ImageInput;
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;
   readonly #loop: RunLoop<Wish>;
@@ -130,7 +130,7 @@ export class PostProcessor {
   }
 
   #run({ inputs }: Wish): Promise<void> {
-    const { name, dtype } = this.#chain.models.at(-1)!.outputs[0] as { name: string; dtype: FinishedPicture['dtype'] };
+    const { name, dtype } = this.#chain.models.at(-1)!.outputs[0] as { name: string; dtype: FinishedImage['dtype'] };
     return this.#chain.run(inputs, ({ tensors, dims }) => {
       if (this.#loop.isClosed) return;
       this.#shown = inputs;
@@ -139,17 +139,17 @@ export class PostProcessor {
   }
 }
 
-function pictureInput(models: readonly GeneratorModel[]): PictureInput {
+function pictureInput(models: readonly GeneratorModel[]): ImageInput {
   const [{ header, contract }] = models;
   const inputs = header.inputs.filter(({ name }) => contract.inputs[name].role === 'image');
   const faults = models
     .filter(({ layout }) => layout !== undefined)
     .map((model) => unsuitable(model, 'a model that writes an image', 'a model that writes Gaussians'));
-  const pictures = inputs.reduce((sum, input) => sum + pictureShapeOf(input).views, 0);
+  const pictures = inputs.reduce((sum, input) => sum + imageShapeOf(input).views, 0);
   if (pictures !== 1) faults.push(unsuitable(models[0], 'one input with the role image', `${pictures} pictures`));
   if (faults.length > 0) throw new ContractError(faults);
   const [input] = inputs;
-  return { name: input.name, ...pictureShapeOf(input) };
+  return { name: input.name, ...imageShapeOf(input) };
 }
 
 const unsuitable = ({ header }: GeneratorModel, expected: string, found: string): ContractFault => ({

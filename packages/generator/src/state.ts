@@ -18,7 +18,7 @@ export interface GeneratorState {
   /** Values of controls by the name of the input: one number for all elements, or all of them; default: the contract's. */
   readonly controls?: Readonly<Record<string, number | ArrayLike<number>>>;
   /**
-   * Images [1,3,H,W] by the names of inputs with the role `image`, for example made by the renderer's `PictureTensor`; needed by every such
+   * Images [1,3,H,W] by the names of inputs with the role `image`, for example made by the renderer's `ImageTensor`; needed by every such
    * input that no model before it in a chain writes.
    */
   readonly pictures?: Readonly<Record<string, GpuTensor>>;

@@ -1,5 +1,5 @@
 import type { GeometryReading } from './geometry-reading.js';
-import type { Wishes } from './gaussian-scene.js';
+import type { PageRequests } from './gaussian-scene.js';
 import type { PageTable } from './page-table.js';
 import type { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
@@ -47,7 +47,7 @@ interface PageBindings {
   readonly splatCount: number;
   readonly detailCount: GPUBindGroup;
   /** Of a page of a streamed scene. */
-  readonly wishes?: { readonly of: Wishes; readonly note: GPUBindGroup };
+  readonly wishes?: { readonly of: PageRequests; readonly note: GPUBindGroup };
   readonly reading: ReadingStages;
   readonly cullChunks: GPUBindGroup;
   readonly cull: GPUBindGroup;

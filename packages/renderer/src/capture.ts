@@ -1,7 +1,7 @@
 import { validateCamera, type Camera } from '@gaussian-splat/core';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import type { FrameRequest } from './frame-request.js';
-import type { FrameSettings, Picture } from './picture.js';
+import type { FrameSettings, FrameTarget } from './picture.js';
 import type { Renderer } from './renderer.js';
 import { requireTextureSize } from './requirements.js';
 import type { Viewpoint } from './viewpoint.js';
@@ -14,7 +14,7 @@ const BYTES_PER_PIXEL = 16;
 const MOST_TRIES = 4;
 
 /** What to capture: a camera, what is behind the splats and the like, and the settings. */
-export interface CaptureRequest extends Omit<Picture, 'target'> {
+export interface CaptureRequest extends Omit<FrameTarget, 'target'> {
   readonly camera: Camera;
   readonly settings?: FrameSettings;
 }

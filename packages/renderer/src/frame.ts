@@ -1,8 +1,8 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings, Stages } from './bindings.js';
-import type { Wishes, WishLevers } from './gaussian-scene.js';
+import type { PageRequests, WishLevers } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
-import type { Levers } from './levers.js';
+import type { RenderSettings } from './levers.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { Scratch } from './scratch.js';
 
@@ -12,12 +12,12 @@ export interface Frame {
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
   readonly camera: Camera;
-  readonly levers: WishLevers & Pick<Levers, 'depthKeyBits'>;
+  readonly levers: WishLevers & Pick<RenderSettings, 'depthKeyBits'>;
   /** Whether {@link Scratch.survivors} is to list the numbers of the visible splats by slot, for auxiliary outputs. */
   readonly keepsSurvivors: boolean;
   /** Whether a page has levels of detail. */
   readonly hasDetail: boolean;
-  /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
+  /** Whether to keep the splats that are looked at within `RenderSettings.splatBudget`. */
   readonly isBudgeted: boolean;
   /** Orders splats pixel by pixel. */
   readonly order: PixelOrder | undefined;
@@ -31,7 +31,7 @@ export interface Frame {
  * the CPU.
  * @returns what must be copied at the end of the frame and read after the submit: pages that streamed scenes lack
  */
-export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wishes[] {
+export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): PageRequests[] {
   const { scratch, bindings, timer } = frame;
   const wishes = wishesDue(frame);
   for (const wish of wishes) wish.begin(encoder);
@@ -64,12 +64,12 @@ function keepWithinBudget(pass: GPUComputePassEncoder, { stages, bindings }: Fra
 }
 
 /** Streamed scenes that want to know now which pages the view asks for. */
-function wishesDue({ bindings, camera, levers }: Frame): Wishes[] {
+function wishesDue({ bindings, camera, levers }: Frame): PageRequests[] {
   const all = new Set(bindings.pages.flatMap(({ wishes }) => (wishes ? [wishes.of] : [])));
   return [...all].filter((wishes) => wishes.isDue(camera, levers));
 }
 
-function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly Wishes[]): void {
+function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly PageRequests[]): void {
   for (const { wishes, splatCount } of bindings.pages) {
     if (wishes && due.includes(wishes.of)) wishes.of.note(pass, wishes.note, splatCount);
   }

@@ -1,7 +1,7 @@
 import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
-import type { Levers } from './levers.js';
+import type { RenderSettings } from './levers.js';
 import type { ShPrecision } from './pack/sh.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
@@ -19,15 +19,15 @@ export interface GaussianPage {
   readonly details?: GPUBuffer;
 }
 
-/** What {@link Wishes} are noted from: a view, and of a page of the pool what lies there. */
+/** What {@link PageRequests} are noted from: a view, and of a page of the pool what lies there. */
 export type NotedPage = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
 
-/** Levers that say which pages a view asks for. */
-export type WishLevers = Pick<Levers, 'detail' | 'detailFade' | 'splatBudget'>;
+/** Settings that say which pages a view asks for. */
+export type WishLevers = Pick<RenderSettings, 'detail' | 'detailFade' | 'splatBudget'>;
 
 /** Carries the pages that a view asks for from a frame to the code that fetches them. Streamed scenes bring their own, so that no other page loads it. */
-export interface Wishes {
-  /** Binds a page of the pool, for {@link Wishes.note}. */
+export interface PageRequests {
+  /** Binds a page of the pool, for {@link PageRequests.note}. */
   bind(page: NotedPage): GPUBindGroup;
   /** Called with the camera and the settings of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
   isDue(camera: Camera, levers: WishLevers): boolean;
@@ -54,7 +54,7 @@ export interface GaussianScene {
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
   /** Of a scene that is streamed: where views record the pages that they need. */
-  readonly wishes?: Wishes;
+  readonly pageRequests?: PageRequests;
   /** Called before each frame: a streamed scene uploads what has come. */
   update?(): void;
   /** Grows whenever the content of the buffers changes; 0 for a scene that never does. */

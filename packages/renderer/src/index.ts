@@ -1,16 +1,16 @@
 export { capture, type CaptureRequest } from './capture.js';
 export { createRenderer } from './choice/choose.js';
-export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
-export type { ChoiceStore } from './choice/kept-choice.js';
+export { autotune, startVariants, type AutotuneOptions, type StartOptions } from './choice/choose.js';
+export type { AutotuneStore } from './choice/kept-choice.js';
 export type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 export { deviceDescriptor } from './device.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
-export type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
+export type { GaussianPage, GaussianScene, PageRequests } from './gaussian-scene.js';
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
-export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
+export { QUALITIES, type PerFrameSettings, type RenderSettings, type Quality } from './levers.js';
 export { LinearColours } from './linear-colours.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
 export { buildPackedLevels, type PackedLevels } from './detail/packed-levels.js';
@@ -45,14 +45,14 @@ export { checkManifest, type DetailManifest } from './detail/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { ShPrecision } from './pack/sh.js';
-export type { AccumulationFormat, FrameNotes, NotedFrame, RasterizerName } from './rasterizers/rasterizer.js';
-export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
-export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
+export type { AccumulationFormat, AuxiliaryOutputs, AuxiliaryFrame, RasterizerName } from './rasterizers/rasterizer.js';
+export { FilteredFrame, type ModelImage } from './pictures/filtered-frame.js';
+export { ImageTensor, type ImageFit, type ImageShape } from './pictures/picture-tensor.js';
 export {
   settings,
   type Composer,
   type FrameSettings,
-  type Picture,
+  type FrameTarget,
   type Rgba,
   type Target,
   type TargetView,

@@ -5,7 +5,7 @@ import type { Threads } from './stages/plan.js';
 /**
  * Everything that trades accuracy for speed, one setting each. docs/frontier has what each costs and saves.
  */
-export interface Levers {
+export interface RenderSettings {
   /**
    * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
    * in float32 and with an end where nothing behind can be seen. `auto`: see {@link createRenderer}.
@@ -61,7 +61,7 @@ export interface Levers {
 export const TRAINED_TRANSMITTANCE = 1e-4;
 
 /** The levers that leave nothing out: what scenes were trained with. */
-const EXACT: Levers = {
+const EXACT: RenderSettings = {
   rasterizer: 'auto',
   threads: 'auto',
   accumulation: 'auto',
@@ -84,7 +84,7 @@ export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
  * What each quality means. The figures are the least PSNR against the float64 reference image that each is held to, on scenes of any kind (captured, opaque, faint, thin; `npm test -- qualities`):
  * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB; captured scenes keep 50 and 44 dB with the last two.
  */
-export const QUALITIES: Readonly<Record<Quality, Levers>> = {
+export const QUALITIES: Readonly<Record<Quality, RenderSettings>> = {
   reference: {
     ...EXACT,
     rasterizer: 'tiles',
@@ -106,12 +106,12 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
 /**
  * The settings that frames may set otherwise than those before and behind them at no cost. The others decide what a viewpoint allocates.
  */
-export type FrameLevers = Pick<
-  Levers,
+export type PerFrameSettings = Pick<
+  RenderSettings,
   'depthKeyBits' | 'transmittanceMin' | 'order' | 'orderWindow' | 'shDegree' | 'detail' | 'resolutionScale'
 >;
 
-const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
+const RANGES: Readonly<Partial<Record<keyof RenderSettings, readonly [least: number, most: number]>>> = {
   submissions: [1, 256],
   transmittanceMin: [0, 1],
   detail: [0, 64],
@@ -121,7 +121,7 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
 };
 
 /** The values of levers that are no range. */
-const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
+const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>>> = {
   rasterizer: ['auto', 'quads', 'tiles'],
   threads: ['auto', 'parallel', 'serial'],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
@@ -135,12 +135,14 @@ const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
  * The levers of a quality, with those that differ from it.
  * @throws GaussianSplatError `argument/value` for a number out of range, a name that its lever does not know or an unknown quality.
  */
-export function leversOf(options: Partial<Levers> & { readonly quality?: Quality }): Levers {
+export function leversOf(options: Partial<RenderSettings> & { readonly quality?: Quality }): RenderSettings {
   const quality = options.quality ?? 'default';
   if (!Object.hasOwn(QUALITIES, quality)) throw invalid('quality', Object.keys(QUALITIES).join(', '), quality);
   const base = QUALITIES[quality];
-  const names = Object.keys(base) as (keyof Levers)[];
-  const levers = Object.fromEntries(names.map((name) => [name, options[name] ?? base[name]])) as unknown as Levers;
+  const names = Object.keys(base) as (keyof RenderSettings)[];
+  const levers = Object.fromEntries(
+    names.map((name) => [name, options[name] ?? base[name]]),
+  ) as unknown as RenderSettings;
   for (const name of names) requireInRange(name, levers[name]);
   if (levers.order === 'pixel' && levers.rasterizer === 'quads') {
     throw invalid('order', "'center' with the rasterizer quads: 'pixel' takes tiles", 'pixel');
@@ -149,7 +151,7 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
 }
 
 /** @throws GaussianSplatError `argument/value` for a value that is not in its lever's range or none of its choices. */
-export function requireInRange(name: keyof Levers, found: unknown, where = 'FrameSettings'): void {
+export function requireInRange(name: keyof RenderSettings, found: unknown, where = 'FrameSettings'): void {
   const choices = CHOICES[name];
   if (choices && !choices.includes(found)) throw invalid(name, choices.join(', '), found, where);
   const range = RANGES[name];

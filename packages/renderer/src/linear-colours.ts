@@ -55,7 +55,7 @@ export class LinearColours implements Composer {
   #copy(encoder: GPUCommandEncoder, { texture, format, width, height }: Target): GPUTextureView {
     if (texture === undefined || (texture.usage & TEXTURE_USAGE.copySource) === 0)
       throw new GaussianSplatError('argument/value', {
-        where: 'Picture.target',
+        where: 'FrameTarget.target',
         expected: 'a texture with the usage COPY_SRC, whose content can be read',
         found: texture ? `usage ${texture.usage}` : 'a view',
         remedy: "give the texture itself, with COPY_SRC, or a colour in place of over: 'target'",

@@ -1,10 +1,10 @@
 import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage, Wishes } from './gaussian-scene.js';
+import type { GaussianPage, PageRequests } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import type { Levers } from './levers.js';
+import type { RenderSettings } from './levers.js';
 import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
 import { cameraValues, MAX_FLOAT32 } from './view.js';
@@ -71,13 +71,13 @@ export class PageTable {
   }
 
   /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
-  wishesOf(page: number): Wishes | undefined {
-    return this.#placementOf[page].scene.wishes;
+  wishesOf(page: number): PageRequests | undefined {
+    return this.#placementOf[page].scene.pageRequests;
   }
 
   /** True if a scene is streamed. */
   get isStreamed(): boolean {
-    return this.#placements.some(({ scene }) => scene.wishes !== undefined);
+    return this.#placements.some(({ scene }) => scene.pageRequests !== undefined);
   }
 
   /** Lets streamed scenes take in what has come. */
@@ -117,7 +117,7 @@ export class PageTable {
   look(
     camera: Camera,
     pixelArea: number,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
+    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: RenderSettings,
     filter?: SplatFilter,
   ): void {
     const shared = {

@@ -1,9 +1,9 @@
 import type { SplatFilter } from '@gaussian-splat/core';
 import type { FrameTimer } from './gpu/pass-timer.js';
-import type { Levers, Quality } from './levers.js';
+import type { RenderSettings, Quality } from './levers.js';
 import { leversOf } from './levers.js';
 import type { Resource } from './gpu/kernel.js';
-import type { FrameNotes, PaintingDepth, Surface } from './rasterizers/rasterizer.js';
+import type { AuxiliaryOutputs, PaintingDepth, Surface } from './rasterizers/rasterizer.js';
 
 /** Red, green, blue and alpha, colour premultiplied. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
@@ -34,7 +34,7 @@ export interface Composer {
 }
 
 /** What a frame is drawn into. */
-export interface Picture {
+export interface FrameTarget {
   /**
    * As large as the camera's image. A texture with the usage STORAGE_BINDING saves `tiles` a pass; of one with several levels or layers the first is
    * drawn into.
@@ -49,7 +49,7 @@ export interface Picture {
   /** Low-pass filter of all scenes of the frame. Default: the one that each was trained with, as far as its file tells. */
   readonly filter?: SplatFilter | undefined;
   /** What to note besides the image: `tiles` only, and not for every frame. */
-  readonly notes?: FrameNotes | undefined;
+  readonly auxiliary?: AuxiliaryOutputs | undefined;
   /** Notes when each pass ran. */
   readonly timer?: FrameTimer | undefined;
 }
@@ -58,7 +58,7 @@ export interface Picture {
  * How a frame is drawn: a quality, and single settings that differ from it. Give the same object for the same settings: what they take is remembered by the
  * object. See {@link settings}.
  */
-export interface FrameSettings extends Partial<Levers> {
+export interface FrameSettings extends Partial<RenderSettings> {
   /** Default: `default`. */
   readonly quality?: Quality;
 }
@@ -72,5 +72,5 @@ export interface FrameSettings extends Partial<Levers> {
  * ```
  * @throws GaussianSplatError `argument/value` for an unknown quality or a value out of its range.
  */
-export const settings = (quality: Quality = 'default', changes: Partial<Levers> = {}): FrameSettings =>
+export const settings = (quality: Quality = 'default', changes: Partial<RenderSettings> = {}): FrameSettings =>
   Object.freeze(leversOf({ ...changes, quality }));

@@ -20,14 +20,15 @@ export class Renderer extends Viewpoint {
    * @throws GaussianSplatError as {@link Viewpoint.draw} does.
    */
   render(request: FrameRequest): void {
-    const { gaussians, camera, target, targetFormat, background, filter, notes, timer } = request;
-    const { levers, detail, splatBudget } = request;
-    requireScenes(gaussians, levers);
+    const { gaussians, camera, target, targetFormat, background, filter, auxiliary, timer } = request;
+    const { settings: changes, detail, splatBudget } = request;
+    requireScenes(gaussians, changes);
     this.#show(Array.isArray(gaussians) ? gaussians : [gaussians as GaussianScene]);
-    const own = levers ?? detail ?? splatBudget;
-    const settings = own === undefined ? undefined : { ...this.#options, ...levers, ...given({ detail, splatBudget }) };
+    const own = changes ?? detail ?? splatBudget;
+    const settings =
+      own === undefined ? undefined : { ...this.#options, ...changes, ...given({ detail, splatBudget }) };
     const view = targetFormat === undefined || isTexture(target) ? target : { view: target, format: targetFormat };
-    this.draw(camera as Camera, { target: view as GPUTexture, over: background, filter, notes, timer }, settings);
+    this.draw(camera as Camera, { target: view as GPUTexture, over: background, filter, auxiliary, timer }, settings);
   }
 
   #show(scenes: readonly GaussianScene[]): void {

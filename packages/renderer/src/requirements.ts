@@ -1,8 +1,8 @@
 /** What a renderer asks of its device and of those who call it, and the errors that say so. */
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { FrameSettings, Picture } from './picture.js';
+import type { FrameSettings, FrameTarget } from './picture.js';
 import { TEXTURE_USAGE } from './gpu/kernel.js';
-import type { Levers } from './levers.js';
+import type { RenderSettings } from './levers.js';
 import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
 
 export function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
@@ -42,11 +42,12 @@ export function requireTarget(target: GPUTexture | undefined, format: string, { 
     );
 }
 
-export function requireNotes({ name, takesNotes }: Rasterizer, { order }: Pick<Levers, 'order'>): void {
-  if (order === 'pixel') throw missing('notes', "settings with order: 'center', or no notes", "order: 'pixel'");
-  if (takesNotes) return;
+export function requireAuxiliary({ name, takesAuxiliary }: Rasterizer, { order }: Pick<RenderSettings, 'order'>): void {
+  if (order === 'pixel')
+    throw missing('auxiliary', "settings with order: 'center', or no auxiliary outputs", "order: 'pixel'");
+  if (takesAuxiliary) return;
   throw new GaussianSplatError('unsupported/limits', {
-    where: 'Picture.notes',
+    where: 'FrameTarget.auxiliary',
     expected: 'settings with the rasterizer tiles',
     found: name,
     remedy: "draw with settings('default', { rasterizer: 'tiles' })",
@@ -64,7 +65,7 @@ export function requireBlendable(device: GPUDevice, format: AccumulationFormat):
 }
 
 /** Of a picture what types alone would say. @throws GaussianSplatError `argument/value` */
-export function requirePicture({ target, over, colours }: Partial<Picture>, settings: FrameSettings): void {
+export function requireFrameTarget({ target, over, colours }: Partial<FrameTarget>, settings: FrameSettings): void {
   if (!isObject(target)) throw missing('target', 'a texture, or { view, format } of one', target);
   if (!('createView' in target) && (typeof target.format !== 'string' || !isObject(target.view)))
     throw missing('target', 'a texture, or a view of one with its format: { view, format }', JSON.stringify(target));
@@ -88,11 +89,15 @@ const formatOf = (target: GPUTexture | { readonly format: GPUTextureFormat }): s
 
 const isObject = (value: unknown): value is object => typeof value === 'object' && value !== null;
 
-function missing(name: keyof Picture | 'settings' | 'gaussians', expected: string, found: unknown): GaussianSplatError {
+function missing(
+  name: keyof FrameTarget | 'settings' | 'gaussians',
+  expected: string,
+  found: unknown,
+): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
-    where: name === 'settings' ? 'FrameSettings' : `Picture.${name}`,
+    where: name === 'settings' ? 'FrameSettings' : `FrameTarget.${name}`,
     expected,
     found: Array.isArray(found) ? `[${found.map(String).join(', ')}]` : String(found),
-    remedy: `see ${name === 'settings' ? 'FrameSettings' : `Picture.${name}`}`,
+    remedy: `see ${name === 'settings' ? 'FrameSettings' : `FrameTarget.${name}`}`,
   });
 }

@@ -11,7 +11,7 @@ import {
   type Overrides,
 } from './gpu/kernel.js';
 import { writeStruct } from './gpu/struct.js';
-import type { FrameNotes, PaintingDepth, QuadsWithDepth, RasterizerName } from './rasterizers/rasterizer.js';
+import type { AuxiliaryOutputs, PaintingDepth, QuadsWithDepth, RasterizerName } from './rasterizers/rasterizer.js';
 import { rasterizeKernel, type RasterizeKernel, type RasterizeVariant } from './rasterizers/tile-kernels.js';
 
 /** Depth that a host has drawn, for splats to be hidden by. */
@@ -83,10 +83,10 @@ export class SceneDepth implements PaintingDepth {
     camera: Camera,
     { width, height }: { readonly width: number; readonly height: number },
     rasterizer: RasterizerName,
-    notes: FrameNotes | undefined,
+    auxiliary: AuxiliaryOutputs | undefined,
   ): void {
     const host = this.#host;
-    if (notes) throw wrong('Picture.depth', 'no depth in a frame with auxiliary outputs', 'both');
+    if (auxiliary) throw wrong('FrameTarget.depth', 'no depth in a frame with auxiliary outputs', 'both');
     if (this.#outTexture) requireRoom(this.#outTexture, width, height, rasterizer);
     const scale = host ? [host.texture.width / width, host.texture.height / height] : [1, 1];
     writeStruct(layouts.SceneDepth, { ...readingOf(host, camera), scale }, this.#bytes);

@@ -1,5 +1,5 @@
 import { perDevice } from './gpu/kernel.js';
-import type { Levers } from './levers.js';
+import type { RenderSettings } from './levers.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 import type { Threads } from './stages/plan.js';
 
@@ -19,7 +19,7 @@ export const SAFE: Variants = {
 /** What is likely to suit a GPU. */
 export const LIKELY: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
 
-/** Variants known to suit a device, set by `chooseVariants`. */
+/** Variants known to suit a device, set by `autotune`. */
 const known = (device: GPUDevice): { variants: Variants } => perDevice(device, 'variants', () => ({ variants: SAFE }));
 
 export function remember(device: GPUDevice, variants: Variants): void {
@@ -29,8 +29,8 @@ export function remember(device: GPUDevice, variants: Variants): void {
 /** What is known to suit a device by now. */
 export const variantsOf = (device: GPUDevice): Variants => known(device).variants;
 
-/** Levers with every `auto` replaced by what suits the device. */
-export function settle(variants: Variants, levers: Levers): Levers & Variants {
+/** Settings with every `auto` replaced by what suits the device. */
+export function settle(variants: Variants, levers: RenderSettings): RenderSettings & Variants {
   const own = levers.order === 'pixel' ? 'tiles' : variants.rasterizer;
   const rasterizer = levers.rasterizer === 'auto' ? own : levers.rasterizer;
   const suits = rasterizer === variants.rasterizer ? variants.accumulation : SAFE.accumulation;

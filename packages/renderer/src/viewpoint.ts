@@ -4,18 +4,18 @@ import { makeStages, type Stages } from './bindings.js';
 import type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
 import { FrameResources, type Resources } from './frame-resources.js';
-import type { Wishes } from './gaussian-scene.js';
+import type { PageRequests } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { orderOn } from './lazy-order.js';
-import { leversOf, type Levers } from './levers.js';
-import type { FrameSettings, Picture, Target } from './picture.js';
+import { leversOf, type RenderSettings } from './levers.js';
+import type { FrameSettings, FrameTarget, Target } from './picture.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
-import type { NotedFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
-import { requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
+import type { AuxiliaryFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
+import { requireAuxiliary, requireFrameTarget, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -53,7 +53,7 @@ export interface ViewpointOptions {
 /** One of several views: see {@link Viewpoint.drawAll}. */
 export interface View {
   readonly camera: Camera;
-  readonly picture: Picture;
+  readonly picture: FrameTarget;
 }
 
 /** A frame that has been encoded. */
@@ -64,13 +64,13 @@ interface Encoded {
   readonly isWatched: boolean;
   readonly submissions: Submissions;
   /** Pages that streamed scenes ask for are to be read. */
-  readonly wishes: readonly Wishes[];
+  readonly wishes: readonly PageRequests[];
   readonly resources: Resources;
 }
 
 /** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
 interface Engine {
-  readonly levers: Levers & Variants;
+  readonly levers: RenderSettings & Variants;
   readonly stages: Stages;
   readonly rasterizer: Rasterizer;
   readonly resources: FrameResources;
@@ -93,7 +93,7 @@ export class Viewpoint {
   readonly world: World;
   readonly #device: GPUDevice;
   /** Of settings that have been met. */
-  #known = new WeakMap<FrameSettings, Levers & Variants>();
+  #known = new WeakMap<FrameSettings, RenderSettings & Variants>();
   /** What `auto` means, until the settings are other ones: no frame changes it. */
   #variants: Variants;
   readonly #compose: ComposeStage;
@@ -143,7 +143,7 @@ export class Viewpoint {
   }
 
   /** The settings that {@link settings} come to on this device; nothing is left `auto`. */
-  get levers(): Levers & Variants {
+  get resolvedSettings(): RenderSettings & Variants {
     return this.#leversOf(this.#settings);
   }
 
@@ -159,9 +159,9 @@ export class Viewpoint {
     return parts.reduce((sum, { byteLength }) => sum + byteLength, 0);
   }
 
-  /** What the last frame that took notes was painted from; undefined before there is one. */
-  get noted(): NotedFrame | undefined {
-    return this.#engine.rasterizer.noted;
+  /** What the last frame with auxiliary outputs was painted from; undefined before there is one. */
+  get auxiliary(): AuxiliaryFrame | undefined {
+    return this.#engine.rasterizer.auxiliary;
   }
 
   /**
@@ -185,7 +185,7 @@ export class Viewpoint {
    * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for another argument; `out-of-memory/buffer-limit` if the scenes
    * need a larger buffer than the device allows.
    */
-  draw(camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
+  draw(camera: Camera, picture: FrameTarget, settings: FrameSettings = this.#settings): void {
     const { timer } = picture;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const encoded = this.#encode(encoder, camera, picture, settings, true);
@@ -211,7 +211,12 @@ export class Viewpoint {
    * the last frame that was recorded. `submissions` of the settings, and `timer` of the frame, are the host's.
    * @throws GaussianSplatError as {@link draw} does.
    */
-  record(encoder: GPUCommandEncoder, camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
+  record(
+    encoder: GPUCommandEncoder,
+    camera: Camera,
+    picture: FrameTarget,
+    settings: FrameSettings = this.#settings,
+  ): void {
     const hosted = { ...picture, timer: undefined };
     const encoded = this.#encode(encoder, camera, hosted, settings, false);
     if (encoded.isWatched || encoded.wishes.length > 0) setTimeout(() => this.#readLater(encoded));
@@ -230,12 +235,12 @@ export class Viewpoint {
   #encode(
     encoder: GPUCommandEncoder,
     camera: Camera,
-    picture: Picture,
+    picture: FrameTarget,
     settings: FrameSettings,
     mayDivide: boolean,
   ): Encoded {
-    const { notes, timer, depth } = picture;
-    requirePicture(picture, settings);
+    const { auxiliary, timer, depth } = picture;
+    requireFrameTarget(picture, settings);
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
     const target = this.#targetOf(picture, camera);
@@ -245,9 +250,9 @@ export class Viewpoint {
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
     const levers = depth && !order ? { ...asked, depthKeyBits: 32 as const } : asked;
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
-    if (notes) requireNotes(rasterizer, levers);
+    if (auxiliary) requireAuxiliary(rasterizer, levers);
     const drawn = scaled(camera, levers.resolutionScale);
-    depth?.prepare(camera, drawn, rasterizer.name, notes);
+    depth?.prepare(camera, drawn, rasterizer.name, auxiliary);
     const resources = all.fit(this.world, levers.splatBudget);
     const { table, scratch, bindings, monitor } = resources;
     table.update();
@@ -260,7 +265,7 @@ export class Viewpoint {
       scratch,
       camera: drawn,
       levers,
-      keepsSurvivors: notes !== undefined,
+      keepsSurvivors: auxiliary !== undefined,
       hasDetail: table.hasDetail,
       isBudgeted: levers.splatBudget > 0 && table.hasDetail,
       order,
@@ -270,12 +275,12 @@ export class Viewpoint {
     const isWatched = monitor.isDue(rasterizer.pairPlan !== undefined, {
       pixels: drawn.width * drawn.height,
       wholePixels: camera.width * camera.height,
-      isWhole: isWhole(levers, this.levers),
+      isWhole: isWhole(levers, this.resolvedSettings),
     });
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
     const depths = depth && !order ? scratch.depths : undefined;
     const ordered = order?.paintingOf(levers, camera, scratch);
-    const how = { levers, notes, survivors: notes && scratch.survivors, timer, depth, depths, ordered };
+    const how = { levers, auxiliary, survivors: auxiliary && scratch.survivors, timer, depth, depths, ordered };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);
     this.#last = { scratch, scale: drawn.width / camera.width };
     return { last, isWatched, submissions, wishes, resources };
@@ -306,7 +311,7 @@ export class Viewpoint {
   }
 
   /** What orders the splats of a frame pixel by pixel; undefined where nothing does, or not yet: then {@link ViewpointOptions.onIncomplete} says when. */
-  #orderOf({ order }: Levers): PixelOrder | undefined {
+  #orderOf({ order }: RenderSettings): PixelOrder | undefined {
     if (order === 'center') return undefined;
     const lazy = orderOn(this.#device);
     // A caller that asks whether the frame is complete gets the error.
@@ -369,8 +374,8 @@ export class Viewpoint {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'levers' | 'notes' | 'survivors' | 'timer' | 'depth' | 'depths' | 'ordered'>,
-    { over, colours }: Picture,
+    how: Pick<Painting, 'levers' | 'auxiliary' | 'survivors' | 'timer' | 'depth' | 'depths' | 'ordered'>,
+    { over, colours }: FrameTarget,
     submissions: Submissions,
   ): GPUCommandEncoder {
     const keeps = over === 'target';
@@ -396,7 +401,7 @@ export class Viewpoint {
 
   /** How this frame is handed over: in one submission, or in as many as keep each short. */
   #submissionsFor(isWatched: boolean): Submissions {
-    const least = Math.ceil(this.levers.submissions);
+    const least = Math.ceil(this.resolvedSettings.submissions);
     if (this.#engine.rasterizer.pairPlan === undefined) return { parts: least };
     const pairs = this.#engine.resources.pairCapacity;
     const watch = isWatched && this.#pacer.wantsToKnow(pairs) ? this.#pacer.watch() : undefined;
@@ -424,7 +429,7 @@ export class Viewpoint {
     return current;
   }
 
-  #leversOf(settings: FrameSettings): Levers & Variants {
+  #leversOf(settings: FrameSettings): RenderSettings & Variants {
     const known = this.#known.get(settings);
     if (known) return known;
     const made = settle(this.#variants, leversOf(settings));
@@ -433,7 +438,7 @@ export class Viewpoint {
   }
 
   /** What frames of these levers are drawn with: made anew where they ask for another rasterizer. */
-  #useEngine(levers: Levers & Variants): Engine {
+  #useEngine(levers: RenderSettings & Variants): Engine {
     const { levers: own } = this.#engine;
     const isOwn =
       own.rasterizer === levers.rasterizer &&
@@ -446,7 +451,7 @@ export class Viewpoint {
     return engine;
   }
 
-  #makeEngine(levers: Levers & Variants): Engine {
+  #makeEngine(levers: RenderSettings & Variants): Engine {
     const stages = makeStages(this.#device, levers);
     const rasterizer = makeRasterizer(this.#device, levers);
     const resources = new FrameResources(this.#device, {
@@ -465,7 +470,7 @@ export class Viewpoint {
     this.#last = undefined;
   }
 
-  #targetOf({ target }: Picture, camera: Camera): Target {
+  #targetOf({ target }: FrameTarget, camera: Camera): Target {
     const { width, height } = camera;
     if (!isTexture(target)) {
       requireTarget(undefined, target.format, camera);
@@ -480,7 +485,7 @@ export class Viewpoint {
 
   /** As large as frames of this target are without levers of their own: one with fewer pixels paints a part of it. */
   #accumulationOf(drawn: Camera, target: Target): Accumulation {
-    const share = this.levers.resolutionScale;
+    const share = this.resolvedSettings.resolutionScale;
     const width = Math.max(drawn.width, Math.round(target.width * share));
     const height = Math.max(drawn.height, Math.round(target.height * share));
     const key = `${width} ${height}`;
@@ -504,7 +509,7 @@ export class Viewpoint {
 }
 
 /** Whether a frame is drawn as one at rest is: with fewer pixels, or painted less far, it says less of what a frame needs. */
-const isWhole = (levers: Levers, base: Levers): boolean =>
+const isWhole = (levers: RenderSettings, base: RenderSettings): boolean =>
   levers.resolutionScale >= base.resolutionScale && levers.transmittanceMin <= base.transmittanceMin;
 
-const isTexture = (target: Picture['target']): target is GPUTexture => 'createView' in target;
+const isTexture = (target: FrameTarget['target']): target is GPUTexture => 'createView' in target;

@@ -68,7 +68,7 @@ describe('levels of detail of a plain file', () => {
       element.cameraOrbit = `${degrees}deg 75deg auto`;
       await frames(1);
     }
-    assert(hasLevels(element), `levels, with ${JSON.stringify(element.stats?.pace)}`);
+    assert(hasLevels(element), `levels, with ${JSON.stringify(element.stats?.dynamicQuality)}`);
     console.log(`levels of 50,000 splats ${(performance.now() - start).toFixed(0)} ms after the first motion`);
     assertEqual(element.stats?.detail.pixels, 0, 'pixels at rest');
     element.cameraOrbit = AT_REST;

@@ -18,7 +18,7 @@ async function turnFor(element: GaussianSplatElement, milliseconds: number): Pro
   for (let degrees = 1; performance.now() < end; degrees++) {
     element.cameraOrbit = `${degrees % 40}deg 75deg auto`;
     await frames(1);
-    const { lastMs = null } = element.stats?.pace ?? {};
+    const { lastMs = null } = element.stats?.dynamicQuality ?? {};
     if (lastMs !== null && lastMs !== times[times.length - 1]) times.push(lastMs);
   }
   return times;
@@ -28,10 +28,11 @@ const median = (values: readonly number[]): number => [...values].sort((a, b) =>
 
 /** Turns the camera until the pace is known. */
 async function findPace(element: GaussianSplatElement): Promise<void> {
-  const isFound = (): boolean => element.stats?.pace.moving !== 'whole' && element.stats?.pace.frameMs !== null;
+  const isFound = (): boolean =>
+    element.stats?.dynamicQuality.moving !== 'whole' && element.stats?.dynamicQuality.frameMs !== null;
   const end = performance.now() + 20_000;
   while (!isFound() && performance.now() < end) await turnFor(element, 300);
-  assert(isFound(), `no pace but ${JSON.stringify(element.stats?.pace)}`);
+  assert(isFound(), `no pace but ${JSON.stringify(element.stats?.dynamicQuality)}`);
 }
 
 /** Ends the camera's motion at a place. @returns when it was last drawn there */
@@ -53,19 +54,20 @@ describe('the pace of pictures', () => {
     for (let round = 0; round < 3; round++) {
       paceds.push(...(await turnFor(auto, 1_000)).slice(1));
       await comeToRest(auto);
-      await until(() => auto.stats?.pace.drawn === 'whole', 'the true image');
+      await until(() => auto.stats?.dynamicQuality.drawn === 'whole', 'the true image');
       // Whole frames in motion, too: a page at rest leaves more of the processor.
       wholes.push(...(await turnFor(unhurried, 1_000)).slice(1));
     }
     const [whole, paced] = [median(wholes), median(paceds)];
     await turnFor(auto, 500);
     // A frame may just have been the last of its level.
-    for (let i = 0; i < 10 && auto.stats?.pace.drawn !== auto.stats?.pace.moving; i++) await turnFor(auto, 100);
-    const { pace, why } = auto.stats!;
+    for (let i = 0; i < 10 && auto.stats?.dynamicQuality.drawn !== auto.stats?.dynamicQuality.moving; i++)
+      await turnFor(auto, 100);
+    const { dynamicQuality: pace, why } = auto.stats!;
     console.log(`${whole.toFixed(0)} ms a frame at full quality, ${paced.toFixed(0)} with ${pace.moving}`);
     await turnFor(fixed, 1_000);
     await comeToRest(fixed);
-    assertEqual(fixed.stats?.pace.drawn, 'whole', 'a page that chose a quality gets it');
+    assertEqual(fixed.stats?.dynamicQuality.drawn, 'whole', 'a page that chose a quality gets it');
     assertEqual(fixed.stats?.why, [], 'and nothing is done to it');
     assert(pace.moving !== 'whole' && pace.drawn === pace.moving, `drawn with ${pace.drawn}`);
     // Where frames are too slow for long, a level up is tried now and then.
@@ -81,7 +83,7 @@ describe('the pace of pictures', () => {
       await gpuIdle();
       await turnFor(auto, 500);
       const rested = await comeToRest(auto);
-      await until(() => auto.stats?.pace.drawn === 'whole', 'the true image');
+      await until(() => auto.stats?.dynamicQuality.drawn === 'whole', 'the true image');
       await gpuIdle();
       waited = Math.min(waited, performance.now() - rested);
     }
@@ -126,14 +128,14 @@ describe('the pace of pictures', () => {
     const element = await showLoaded({ ...SCENE, 'interpolation-decay': '0' }, SIZE);
     await findPace(element);
     // The first frame of a motion is whole, however long it takes.
-    for (let i = 0; i < 10 && element.stats?.pace.drawn === 'whole'; i++) await turnFor(element, 300);
-    assert(element.stats?.pace.drawn !== 'whole', 'in motion');
+    for (let i = 0; i < 10 && element.stats?.dynamicQuality.drawn === 'whole'; i++) await turnFor(element, 300);
+    assert(element.stats?.dynamicQuality.drawn !== 'whole', 'in motion');
     element.cameraOrbit = '20deg 70deg auto';
     element.jumpCameraToGoal();
     await frames(1);
     const moving = await element.toBlob();
     await delay(600);
-    assertEqual(element.stats?.pace.drawn, 'whole', 'at rest');
+    assertEqual(element.stats?.dynamicQuality.drawn, 'whole', 'at rest');
     const resting = await element.toBlob();
     assertEqual(moving.size, resting.size, 'bytes of the pictures');
     const [a, b] = await Promise.all([moving, resting].map(async (blob) => new Uint8Array(await blob.arrayBuffer())));
@@ -150,7 +152,7 @@ describe('the pace of pictures', () => {
     await delay(2_500);
     element.cameraOrbit = '5deg 75deg auto';
     await frames(3);
-    assertEqual(element.stats?.pace.drawn, 'whole', 'the step');
+    assertEqual(element.stats?.dynamicQuality.drawn, 'whole', 'the step');
   });
 
   it('no element is charged with what others draw', async () => {

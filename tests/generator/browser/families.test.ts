@@ -1,6 +1,6 @@
 /** One small file of every family that the exporter writes (packages/exporter/tests/write_zoo.py): the GPU against the CPU, in numbers and in pictures. */
 import { numberToHalf } from '@gaussian-splat/core';
-import { capture, DynamicGaussians, PictureTensor, Renderer } from '@gaussian-splat/renderer';
+import { capture, DynamicGaussians, ImageTensor, Renderer } from '@gaussian-splat/renderer';
 import {
   Generator,
   openModel,
@@ -30,7 +30,7 @@ const HALVES = ['classic', 'classic-view', 'scaffold', 'octree-round', 'hexplane
 );
 
 let device: GPUDevice;
-const pictures = new Map<string, PictureTensor>();
+const pictures = new Map<string, ImageTensor>();
 
 /** A state that differs with `step`: another camera, time, pose and picture. */
 async function stateAt({ header, contract }: GeneratorModel, step: number): Promise<GeneratorState> {
@@ -54,13 +54,13 @@ async function stateAt({ header, contract }: GeneratorModel, step: number): Prom
   return { ...state, pictures: given };
 }
 
-async function pictureFor(name: string, { inputs }: GeneratorModel['header'], step: number): Promise<PictureTensor> {
+async function pictureFor(name: string, { inputs }: GeneratorModel['header'], step: number): Promise<ImageTensor> {
   const [height, width] = inputs
     .find((input) => input.name === name)!
     .dims!.slice(2)
     .map(Number);
   const key = `${name} ${width} ${height}`;
-  const tensor = pictures.get(key) ?? new PictureTensor(device, { width, height, dtype: 'float32' });
+  const tensor = pictures.get(key) ?? new ImageTensor(device, { width, height, dtype: 'float32' });
   pictures.set(key, tensor);
   const pixels = new Uint8ClampedArray(4 * width * height).map((_, i) =>
     i % 4 === 3 ? 255 : 128 + 120 * Math.sin(0.13 * i + step + name.length),

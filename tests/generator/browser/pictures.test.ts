@@ -1,5 +1,5 @@
 /** Pictures as tensors, post-processors and chains, from GPU buffer to GPU buffer. */
-import { DynamicGaussians, FilteredFrame, PictureTensor, type PictureFit } from '@gaussian-splat/renderer';
+import { DynamicGaussians, FilteredFrame, ImageTensor, type ImageFit } from '@gaussian-splat/renderer';
 import { Generator, PostProcessor } from '@gaussian-splat/generator';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import {
@@ -31,7 +31,7 @@ function resampled(
   pixels: ArrayLike<number>,
   [width, height]: readonly [number, number],
   [columns, rows]: readonly [number, number],
-  fit: PictureFit,
+  fit: ImageFit,
 ): number[] {
   const steps = [width / columns, height / rows];
   const step = fit === 'cover' ? [Math.min(...steps), Math.min(...steps)] : steps;
@@ -58,8 +58,8 @@ function resampled(
   );
 }
 
-async function tensorOf(width: number, height: number, shape: PictureTensor['shape'], fit?: PictureFit) {
-  const tensor = new PictureTensor(device, shape);
+async function tensorOf(width: number, height: number, shape: ImageTensor['shape'], fit?: ImageFit) {
+  const tensor = new ImageTensor(device, shape);
   const pixels = colourful(width, height);
   tensor.upload(await createImageBitmap(new ImageData(pixels, width, height)), fit);
   return { tensor, pixels };
@@ -99,7 +99,7 @@ describe('a picture as a tensor', () => {
   }
 
   it('without pixels is refused', () => {
-    const tensor = new PictureTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
     let code = 'none';
     try {
       tensor.upload(new Image());
@@ -156,7 +156,7 @@ describe('a post-processor', () => {
       onError: reportError,
       onPicture: ({ buffer }) => reading.push(readBuffer(device, buffer)),
     });
-    const tensor = new PictureTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
     for (const grey of [255, 51, 0]) {
       tensor.upload(await plainPicture(grey));
       post.request(tensor);
@@ -256,7 +256,7 @@ describe('Gaussians made of a picture', () => {
   it('are made anew where their rows get their shape last of all', async () => {
     const generator = await Generator.open({ url: `${FIXTURES}picture-copied.onnx` }, device, { onError: reportError });
     const sink = (generator.sink = new ReadingSink(device));
-    const tensor = new PictureTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
     for (const grey of [255, 51, 0]) {
       tensor.upload(await plainPicture(grey));
       generator.request({ pictures: { image: tensor } });

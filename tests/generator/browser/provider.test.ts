@@ -1,6 +1,6 @@
 /** What is known of ONNX Runtime's WebGPU provider, held against the version that ships: recorded commands, and convolutions. */
 import { bytesSource, constantOutputs, readOnnxHeader } from '@gaussian-splat/core';
-import { PictureTensor } from '@gaussian-splat/renderer';
+import { ImageTensor } from '@gaussian-splat/renderer';
 import { bindInputs, openModel, PostProcessor, type GeneratorState } from '@gaussian-splat/generator';
 import type * as FirstRun from '../../../packages/generator/dist/runtime/first-run.js';
 import type * as LoadRuntime from '../../../packages/generator/dist/runtime/load-runtime.js';
@@ -96,7 +96,7 @@ describe('recorded commands', () => {
 });
 
 /** What the WebGPU provider writes, whatever we think of it. */
-async function onProvider(url: string, image: PictureTensor): Promise<number[]> {
+async function onProvider(url: string, image: ImageTensor): Promise<number[]> {
   const model = await openModel({ url });
   const session = await LiveSession.create('webgpu', await loadRuntime(), model, device);
   let reading: Promise<Uint8Array> | undefined;
@@ -146,7 +146,7 @@ describe('convolutions', () => {
         onFallback: (reason) => reasons.push(reason),
         onPicture: ({ buffer }) => (picture = readBuffer(device, buffer)),
       });
-      const tensor = new PictureTensor(device, { width: 16, height: 16, dtype: 'float32' });
+      const tensor = new ImageTensor(device, { width: 16, height: 16, dtype: 'float32' });
       const pixels = new Uint8ClampedArray(4 * 256).map((_, i) => (i % 4 === 3 ? 255 : 128 + 100 * Math.sin(0.7 * i)));
       tensor.upload(await createImageBitmap(new ImageData(pixels, 16, 16)));
       post.request(tensor);

@@ -7,7 +7,7 @@ import {
   resolveContract,
   type Camera,
 } from '@gaussian-splat/core';
-import { chooseVariants } from '@gaussian-splat/renderer';
+import { autotune } from '@gaussian-splat/renderer';
 import { bindInputs, setRuntimeLocation, type GaussianSink, type GeneratorState } from '@gaussian-splat/generator';
 import type * as OnnxRuntime from 'onnxruntime-web/wasm';
 
@@ -43,7 +43,7 @@ export async function makeDevice(optional: readonly GPUFeatureName[] = []): Prom
     threads: 'serial',
     sort: 'serial',
   });
-  await chooseVariants(device, { store: { getItem: () => choice, setItem: () => undefined } });
+  await autotune(device, { store: { getItem: () => choice, setItem: () => undefined } });
   return device;
 }
 

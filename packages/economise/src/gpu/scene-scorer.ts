@@ -100,8 +100,8 @@ export class SceneScorer {
   /** Draws a view and notes the largest weights in it. */
   #paint(camera: Camera): void {
     const target = this.#targetOf(camera);
-    const notes = { contributions: this.#peaks };
-    this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, notes });
+    const auxiliary = { contributions: this.#peaks };
+    this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, auxiliary });
   }
 
   /** @returns whether there was room for all that each view should show; if not, there will be */

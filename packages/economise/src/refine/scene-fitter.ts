@@ -120,8 +120,8 @@ export class SceneFitter {
   look(view: number): void {
     const { camera, reference } = this.#errors.exhibits[view];
     const image = this.#errors.targetOf(camera);
-    this.#renderer.render({ gaussians: this.#scene, camera, target: image, notes: {} });
-    const noted = this.#renderer.noted;
+    this.#renderer.render({ gaussians: this.#scene, camera, target: image, auxiliary: {} });
+    const noted = this.#renderer.auxiliary;
     if (noted === undefined) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.look' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.look' });

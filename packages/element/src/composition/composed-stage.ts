@@ -1,5 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { Picture, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { FrameTarget, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Entrance, SceneState } from '../controllers/scene-controller.js';
 import type { ElementError } from '../errors.js';
@@ -67,7 +67,7 @@ export class ComposedStage extends Stage {
     return `${allOf(this).prepareFrame()} ${super.prepareFrame()}`;
   }
 
-  drawBeneath(frame: Frame): Partial<Picture> {
+  drawBeneath(frame: Frame): Partial<FrameTarget> {
     return allOf(this).drawBeneath(frame);
   }
 

@@ -1,5 +1,5 @@
 import { loadModule, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
-import { boundsOfWorld, type Picture, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
+import { boundsOfWorld, type FrameTarget, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
 import type { ViewerFrame } from '../camera/orbit.js';
 import { frameOf, type SceneBounds } from '../camera/settings.js';
 import type { MotionHost } from '../controllers/motion-controller.js';
@@ -270,7 +270,7 @@ export class Composition {
     return this.#models.map(({ model }) => model.version).join();
   }
 
-  drawBeneath(frame: Frame): Partial<Picture> {
+  drawBeneath(frame: Frame): Partial<FrameTarget> {
     const models = this.#models;
     return this.#meshes && models.length > 0 ? this.#meshes.draw(frame, models, this.frame) : {};
   }

@@ -1,5 +1,5 @@
 import type { Camera, Matrix4 } from '@gaussian-splat/core';
-import type { Picture, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { FrameTarget, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import type { ViewerFrame } from '../camera/orbit.js';
 import type { SceneState } from '../controllers/scene-controller.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
@@ -20,7 +20,7 @@ export interface PlacedModel {
 export interface MeshDrawing {
   readonly device: GPUDevice;
   /** Draws them into a frame. @returns where splats are drawn over them */
-  draw(frame: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<Picture>;
+  draw(frame: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<FrameTarget>;
   /** Puts depths of meshes into what was found of splats. */
   probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]>;
   destroy(): void;

@@ -1,5 +1,5 @@
 import { loadModule } from '@gaussian-splat/core';
-import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
+import type { PerFrameSettings, WorkTime } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
 import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
 import type { keepPace, resized } from '../pace/pace.js';
@@ -33,7 +33,7 @@ const OTHER_SIZE = 1.25;
 export interface FramePlan {
   /** Number of the level; 0 is the whole image. */
   readonly level: number;
-  readonly levers: Partial<FrameLevers> | undefined;
+  readonly levers: Partial<PerFrameSettings> | undefined;
   /** Number of the size that pictures have. */
   readonly size: number;
 }
@@ -51,7 +51,7 @@ export interface FrameOccasion {
 }
 
 /** What the controller says about itself. */
-export interface PaceReport {
+export interface DynamicQualityReport {
   /** Name of the level that the last frame was drawn with; `whole` is the image at rest. */
   readonly drawn: string;
   /** Name of the level of frames in motion. */
@@ -115,7 +115,7 @@ export class PaceController {
     return (SHARE_OF_INTERVAL * displayInterval) / clients;
   }
 
-  get report(): PaceReport {
+  get report(): DynamicQualityReport {
     const { level, reason, recent } = this.#pace;
     const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
     return {

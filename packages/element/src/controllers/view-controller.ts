@@ -1,5 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
+import type { PerFrameSettings, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -46,7 +46,7 @@ interface Settle {
 }
 
 /** All that pictures in motion may be drawn with. */
-const MOVING_LEVERS: readonly Partial<FrameLevers>[] = LADDER.flatMap(({ levers }) => levers ?? []);
+const MOVING_LEVERS: readonly Partial<PerFrameSettings>[] = LADDER.flatMap(({ levers }) => levers ?? []);
 
 /** A scene that is replaced sooner, as a preview may be, needs nothing made for it, ms. */
 const PREPARE_AFTER_MS = 300;

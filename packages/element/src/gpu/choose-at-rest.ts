@@ -1,4 +1,4 @@
-import { chooseVariants } from '@gaussian-splat/renderer';
+import { autotune } from '@gaussian-splat/renderer';
 import { sinceLastPicture } from './frame-scheduler.js';
 
 /** Milliseconds without a picture after which a page counts as at rest. */
@@ -10,7 +10,7 @@ const REST_MS = 1500;
  */
 export function chooseAtRest(device: GPUDevice): void {
   // Nobody waits for it, and what is on show is right without.
-  chooseVariants(device, { pause: untilRest }).catch(() => undefined);
+  autotune(device, { pause: untilRest }).catch(() => undefined);
 }
 
 async function untilRest(): Promise<void> {

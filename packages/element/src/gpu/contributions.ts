@@ -44,7 +44,7 @@ async function countContributing({ device, view }: Viewport, camera: Camera): Pr
   });
   try {
     for (let tries = 0; tries < MOST_TRIES; tries++) {
-      viewpoint.draw(camera, { target, filter, notes: { contributions } });
+      viewpoint.draw(camera, { target, filter, auxiliary: { contributions } });
       if (await viewpoint.isComplete()) break;
     }
     const encoder = device.createCommandEncoder({ label: 'gs.contributions' });

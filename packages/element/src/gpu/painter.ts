@@ -1,8 +1,8 @@
 import type { Camera, GaussianSplatError, ShDegree, SplatFilter } from '@gaussian-splat/core';
 import type {
-  FrameLevers,
-  Levers,
-  Picture,
+  PerFrameSettings,
+  RenderSettings,
+  FrameTarget,
   ProbeAnswer,
   ProbePoint,
   Quality,
@@ -19,7 +19,7 @@ export interface Rendering {
   readonly quality: Quality;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly shDegree: ShDegree;
-  readonly order: Levers['order'];
+  readonly order: RenderSettings['order'];
   /** In place of those of the scenes. */
   readonly filter?: SplatFilter | undefined;
 }
@@ -38,7 +38,7 @@ export interface Contents {
    */
   prepareFrame(): string;
   /** Draws what is no splats, before these are drawn over it. @returns where the splats are drawn, as far as that differs */
-  drawBeneath?(frame: Frame): Partial<Picture>;
+  drawBeneath?(frame: Frame): Partial<FrameTarget>;
 }
 
 /** What a painter tells. */
@@ -63,7 +63,7 @@ export interface CanvasFrame {
   /** Premultiplied. */
   readonly background?: Rgba | undefined;
   /** What is other than at rest. */
-  readonly levers?: Partial<FrameLevers> | undefined;
+  readonly levers?: Partial<PerFrameSettings> | undefined;
   /** The picture is read in the same task. */
   readonly isRead?: boolean;
 }
@@ -84,7 +84,7 @@ export interface Painter {
   /** Draws the frames to come like this. */
   setRendering(rendering: Rendering): void;
   /** Makes what frames with other levers need, so that none of them has to. */
-  prepare(levers: readonly Partial<FrameLevers>[]): void;
+  prepare(levers: readonly Partial<PerFrameSettings>[]): void;
   /** The canvas's context, set up to be drawn into; null for a canvas of another kind. */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null;
   /**

@@ -2,7 +2,7 @@ import { loadModule, type Camera, type SplatFilter } from '@gaussian-splat/core'
 import {
   QueueClock,
   Viewpoint,
-  type FrameLevers,
+  type PerFrameSettings,
   type FrameSettings,
   type ProbeAnswer,
   type ProbePoint,
@@ -82,7 +82,7 @@ export class Viewport implements Painter {
   }
 
   /** Settings of a frame; with levers of motion where there are some. */
-  #settings(levers?: Partial<FrameLevers>): FrameSettings {
+  #settings(levers?: Partial<PerFrameSettings>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { submissions } = this.#place;
     const { quality, shDegree, order } = this.#rendering;
@@ -95,7 +95,7 @@ export class Viewport implements Painter {
     return this.#isPrepared;
   }
 
-  prepare(levers: readonly Partial<FrameLevers>[]): void {
+  prepare(levers: readonly Partial<PerFrameSettings>[]): void {
     if (this.isLost || this.#isDestroyed) return;
     this.#isPrepared = true;
     this.viewpoint.prepare(

@@ -1,5 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { FrameLevers, Rgba } from '@gaussian-splat/renderer';
+import type { PerFrameSettings, Rgba } from '@gaussian-splat/renderer';
 import type { GeneratorInput } from './inputs.js';
 
 /** A frame to draw. */
@@ -9,7 +9,7 @@ export interface Frame {
   /** Premultiplied. */
   readonly background?: Rgba | undefined;
   /** What is other than at rest. */
-  readonly levers?: Partial<FrameLevers> | undefined;
+  readonly levers?: Partial<PerFrameSettings> | undefined;
 }
 
 /** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */

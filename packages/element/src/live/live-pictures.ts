@@ -1,8 +1,8 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { pictureShapeOf, type GeneratorModel, type GpuTensor } from '@gaussian-splat/generator';
-import { PictureTensor, type PictureShape } from '@gaussian-splat/renderer';
+import { imageShapeOf, type GeneratorModel, type GpuTensor } from '@gaussian-splat/generator';
+import { ImageTensor, type ImageShape } from '@gaussian-splat/renderer';
 import { fetchBeside } from './fetch-beside.js';
-import { valueOf, type Picture, type Pictures } from './values.js';
+import { valueOf, type ImageSource, type ImageSources } from './values.js';
 
 export interface LivePicturesOptions {
   readonly credentials: RequestCredentials;
@@ -15,15 +15,15 @@ export interface LivePicturesOptions {
 }
 
 /** Size of a tensor as far as the model fixes it. */
-type WantedShape = ReturnType<typeof pictureShapeOf>;
+type WantedShape = ReturnType<typeof imageShapeOf>;
 
 /** The pictures that models take as inputs: fetched, cut to the model's proportions and resampled on the GPU whenever the page names others. */
 export class LivePictures {
   readonly #device: GPUDevice;
   readonly #options: LivePicturesOptions;
   readonly #shapes = new Map<string, WantedShape>();
-  readonly #sources = new Map<string, Pictures>();
-  readonly #tensors: Record<string, PictureTensor> = {};
+  readonly #sources = new Map<string, ImageSources>();
+  readonly #tensors: Record<string, ImageTensor> = {};
   readonly #loading = new Set<Promise<void>>();
   #isDestroyed = false;
 
@@ -39,7 +39,7 @@ export class LivePictures {
     for (const { header, contract } of models) {
       for (const input of header.inputs) {
         if (contract.inputs[input.name].role !== 'image' || given.has(input.name)) continue;
-        this.#shapes.set(input.name, pictureShapeOf(input));
+        this.#shapes.set(input.name, imageShapeOf(input));
       }
     }
   }
@@ -60,7 +60,7 @@ export class LivePictures {
   }
 
   /** The pictures that the page names now; only new ones are loaded. */
-  update(pictures: Readonly<Record<string, Pictures>>): void {
+  update(pictures: Readonly<Record<string, ImageSources>>): void {
     for (const name of this.#shapes.keys()) {
       const source = valueOf(pictures, name);
       if (source === undefined || isSame(source, this.#sources.get(name))) continue;
@@ -79,7 +79,7 @@ export class LivePictures {
     void this.#options.whenIdle().then(() => Object.values(this.#tensors).forEach((tensor) => tensor.destroy()));
   }
 
-  async #load(name: string, source: Pictures): Promise<void> {
+  async #load(name: string, source: ImageSources): Promise<void> {
     try {
       const sources = listed(name, source, this.#shapes.get(name)!.views);
       const made: ImageBitmap[] = [];
@@ -103,21 +103,21 @@ export class LivePictures {
     }
   }
 
-  #tensorFor(name: string, pixels: GPUCopyExternalImageSource): PictureTensor {
+  #tensorFor(name: string, pixels: GPUCopyExternalImageSource): ImageTensor {
     const wanted = this.#shapes.get(name)!;
     const own = ownSize(pixels);
-    const shape: PictureShape = { ...wanted, width: wanted.width ?? own.width, height: wanted.height ?? own.height };
-    const found = this.#tensors[name] as PictureTensor | undefined;
+    const shape: ImageShape = { ...wanted, width: wanted.width ?? own.width, height: wanted.height ?? own.height };
+    const found = this.#tensors[name] as ImageTensor | undefined;
     if (found?.shape.width === shape.width && found.shape.height === shape.height) return found;
     void this.#options.whenIdle().then(() => found?.destroy());
-    return (this.#tensors[name] = new PictureTensor(this.#device, shape));
+    return (this.#tensors[name] = new ImageTensor(this.#device, shape));
   }
 }
 
 /** As many pictures as the input takes: a list, or addresses with spaces between them. */
-function listed(name: string, source: Pictures, views: number): readonly Picture[] {
+function listed(name: string, source: ImageSources, views: number): readonly ImageSource[] {
   const text = typeof source === 'string' && views > 1 ? source.trim().split(/\s+/) : source;
-  const list = Array.isArray(text) ? (text as readonly Picture[]) : [text as Picture];
+  const list = Array.isArray(text) ? (text as readonly ImageSource[]) : [text as ImageSource];
   if (list.length === views) return list;
   throw new GaussianSplatError('argument/value', {
     where: `control ${name}`,
@@ -128,14 +128,14 @@ function listed(name: string, source: Pictures, views: number): readonly Picture
 }
 
 /** Lists are new objects whenever a page sets its controls. */
-function isSame(a: Pictures, b: Pictures | undefined): boolean {
+function isSame(a: ImageSources, b: ImageSources | undefined): boolean {
   if (!Array.isArray(a) || !Array.isArray(b)) return a === b;
-  return a.length === b.length && a.every((each, i) => each === (b as readonly Picture[])[i]);
+  return a.length === b.length && a.every((each, i) => each === (b as readonly ImageSource[])[i]);
 }
 
 async function pixelsOf(
   name: string,
-  source: Picture,
+  source: ImageSource,
   options: LivePicturesOptions,
 ): Promise<GPUCopyExternalImageSource> {
   if (source instanceof HTMLImageElement) {

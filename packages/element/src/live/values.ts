@@ -37,18 +37,18 @@ function flatten(value: unknown): number[] {
 export const CONTROL_PREFIX = 'control-';
 
 /** An image for a model: its URL, or what holds its pixels. */
-export type Picture = string | Blob | GPUCopyExternalImageSource;
+export type ImageSource = string | Blob | GPUCopyExternalImageSource;
 
 /** Of an input that takes several, a list, or addresses with spaces between them. */
-export type Pictures = Picture | readonly Picture[];
+export type ImageSources = ImageSource | readonly ImageSource[];
 
 /** Controls as a page gives them, by the names of the model's inputs: numbers, and images for inputs that take some. */
-export type ControlValues = Readonly<Record<string, Numbers | Pictures>>;
+export type ControlValues = Readonly<Record<string, Numbers | ImageSources>>;
 
 /** Controls, sorted by what they hold. */
 export interface ReadControls {
   readonly controls: Readonly<Record<string, readonly number[]>>;
-  readonly pictures: Readonly<Record<string, Pictures>>;
+  readonly pictures: Readonly<Record<string, ImageSources>>;
 }
 
 /**
@@ -60,18 +60,18 @@ export function readControls(
   property: ControlValues | null | undefined,
   warn: (sentence: string) => void,
 ): ReadControls {
-  const written: [string, Numbers | Pictures][] = [];
+  const written: [string, Numbers | ImageSources][] = [];
   for (const { name, value } of attributes) {
     if (name.startsWith(CONTROL_PREFIX)) written.push([name.slice(CONTROL_PREFIX.length), value]);
   }
   const controls: Record<string, number[]> = {};
-  const pictures: Record<string, Pictures> = {};
+  const pictures: Record<string, ImageSources> = {};
   for (const [name, value] of [...written, ...Object.entries(property ?? {})]) {
     const numbers = isPixels(value) ? undefined : readNumbers(value as Numbers);
     delete controls[name];
     delete pictures[name];
     if (numbers) controls[name] = numbers;
-    else if (isPixels(value) || (typeof value === 'string' && value !== '')) pictures[name] = value as Pictures;
+    else if (isPixels(value) || (typeof value === 'string' && value !== '')) pictures[name] = value as ImageSources;
     else warn(`<gaussian-splat>: control ${name} expects numbers, found ${JSON.stringify(value)}; its default counts.`);
   }
   return { controls, pictures };

@@ -1,5 +1,5 @@
 import { multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
-import { SceneDepth, type Picture, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
+import { SceneDepth, type FrameTarget, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
 import {
   Camera as ThreeCamera,
   DepthTexture,
@@ -64,7 +64,11 @@ export class MeshLayer implements MeshDrawing {
     return new MeshLayer(device, renderer);
   }
 
-  draw({ camera, target, background }: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<Picture> {
+  draw(
+    { camera, target, background }: Frame,
+    models: readonly PlacedModel[],
+    world: ViewerFrame,
+  ): Partial<FrameTarget> {
     this.#arrange(models, world);
     this.#look(camera, world);
     const { width, height } = camera;

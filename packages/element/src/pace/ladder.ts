@@ -1,11 +1,11 @@
-import { QUALITIES, type FrameLevers } from '@gaussian-splat/renderer';
+import { QUALITIES, type PerFrameSettings } from '@gaussian-splat/renderer';
 
 /** How frames in motion may be drawn. */
 export interface Level {
   /** For people. */
   readonly name: string;
   /** What frames are drawn with; undefined on the first level, where nothing differs from the image at rest. */
-  readonly levers: Partial<FrameLevers> | undefined;
+  readonly levers: Partial<PerFrameSettings> | undefined;
   /** Share of the image's width and height that is drawn. */
   readonly scale: number;
 }
@@ -20,7 +20,7 @@ const SCALES = [0.71, 0.5, 0.35, 0.25];
 const [BALANCED_DETAIL, SMALLER_DETAIL] = [0.5, 1];
 
 const { depthKeyBits, transmittanceMin } = QUALITIES.balanced;
-const balanced: Partial<FrameLevers> = { depthKeyBits, transmittanceMin, detail: BALANCED_DETAIL };
+const balanced: Partial<PerFrameSettings> = { depthKeyBits, transmittanceMin, detail: BALANCED_DETAIL };
 
 /**
  * All levels, from the whole image down: the settings of the quality `balanced`, which lose least for what they win, then fewer pixels. Single objects, since

@@ -1,31 +1,31 @@
 import { loadModule } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
-import { keyFor, pageStore, readChoice, writeChoice, type ChoiceStore } from './kept-choice.js';
+import { keyFor, pageStore, readChoice, writeChoice, type AutotuneStore } from './kept-choice.js';
 import { ANSWER_TARGET, FrameClock, isRight, timeFrames, type Trial } from './trials.js';
 import type { RendererOptions } from '../frame-request.js';
 import { Renderer } from '../renderer.js';
 
 /**
  * A renderer whose `auto` settings have been decided on this device: variants that give a wrong image are ruled out by a self-test, the
- * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
+ * others are timed (see {@link autotune}). The constructor decides by what has been chosen on the device before, or else takes
  * `quads`, `rgba16float` and `parallel`, which work everywhere.
  */
 export async function createRenderer(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
-  await chooseVariants(device);
+  await autotune(device);
   return new Renderer(device, options);
 }
 
-export interface ChoiceOptions {
+export interface AutotuneOptions {
   /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
-  readonly store?: ChoiceStore | null;
+  readonly store?: AutotuneStore | null;
   /** Awaited before each piece of the work, for pages that have something better to do at times. */
   readonly pause?: () => Promise<void>;
   /** Of the frames to come: what they need is made at the same time. */
   readonly format?: GPUTextureFormat;
 }
 
-export interface StartOptions extends ChoiceOptions {
+export interface StartOptions extends AutotuneOptions {
   /** Milliseconds that a small frame of what is likely to suit a GPU may take there; default 8. */
   readonly quickMs?: number;
 }
@@ -47,9 +47,9 @@ const QUICK_MS = 8;
 
 /**
  * Finds variants with which a first frame can be drawn soon, once for each device: those that an earlier visit chose; else what is likely to suit a
- * GPU, if it passes the self-test and is quick enough; else what {@link chooseVariants} takes seconds to find, which a page with a likely one
+ * GPU, if it passes the self-test and is quick enough; else what {@link autotune} takes seconds to find, which a page with a likely one
  * may ask for later, when it is at rest.
- * @throws GaussianSplatError as {@link chooseVariants}
+ * @throws GaussianSplatError as {@link autotune}
  */
 export function startVariants(device: GPUDevice, options: StartOptions = {}): Promise<Variants> {
   const choice = choiceOf(device);
@@ -60,7 +60,7 @@ async function start(device: GPUDevice, options: StartOptions, choice: Choice): 
   const { store = pageStore(), quickMs = QUICK_MS, format } = options;
   const isOpen = !device.adapterInfo?.isFallbackAdapter && readChoice(store, device) === undefined;
   const isGood = isOpen && (await measured('start', () => isGoodStart(device, quickMs, format)));
-  if (!isGood) return chooseVariants(device, options);
+  if (!isGood) return autotune(device, options);
   if (!choice.chosen) remember(device, LIKELY);
   return LIKELY;
 }
@@ -78,11 +78,11 @@ async function isGoodStart(device: GPUDevice, quickMs: number, format?: GPUTextu
  * only its answer is checked again. What it took is in the performance timeline, as `gaussian-splat.search`; of that, `detail.paused` milliseconds were pauses.
  * @throws GaussianSplatError `unsupported/wrong-image` if no variant passes the self-test.
  */
-export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
+export function autotune(device: GPUDevice, options: AutotuneOptions = {}): Promise<Variants> {
   return (choiceOf(device).chosen ??= choose(device, options));
 }
 
-async function choose(device: GPUDevice, options: ChoiceOptions): Promise<Variants> {
+async function choose(device: GPUDevice, options: AutotuneOptions): Promise<Variants> {
   const { store = pageStore(), pause = noPause, format } = options;
   const kept = readChoice(store, device);
   const variants = kept !== undefined && (await isRight(device, kept, format)) ? kept : await search(device, pause);

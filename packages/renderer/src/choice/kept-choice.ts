@@ -1,7 +1,7 @@
 import type { Variants } from '../variants.js';
 
 /** Where a choice is kept between visits: `localStorage`, or anything like it. */
-export interface ChoiceStore {
+export interface AutotuneStore {
   getItem(key: string): string | null;
   setItem(key: string, value: string): void;
 }
@@ -17,9 +17,9 @@ export function keyFor(device: GPUDevice): string {
 }
 
 /** Where pages keep theirs; null where they have or may use none. */
-export function pageStore(): ChoiceStore | null {
+export function pageStore(): AutotuneStore | null {
   try {
-    return (globalThis as { localStorage?: ChoiceStore }).localStorage ?? null;
+    return (globalThis as { localStorage?: AutotuneStore }).localStorage ?? null;
   } catch {
     // A page may be denied its storage.
     return null;
@@ -27,7 +27,7 @@ export function pageStore(): ChoiceStore | null {
 }
 
 /** The choice of an earlier visit; undefined where there is none that this device can have. */
-export function readChoice(store: ChoiceStore | null, device: GPUDevice): Variants | undefined {
+export function readChoice(store: AutotuneStore | null, device: GPUDevice): Variants | undefined {
   try {
     const { rasterizer, accumulation, threads } = JSON.parse(
       store?.getItem(keyFor(device)) ?? '{}',
@@ -42,7 +42,7 @@ export function readChoice(store: ChoiceStore | null, device: GPUDevice): Varian
   }
 }
 
-export function writeChoice(store: ChoiceStore | null, key: string, variants: Variants): void {
+export function writeChoice(store: AutotuneStore | null, key: string, variants: Variants): void {
   try {
     store?.setItem(key, JSON.stringify(variants));
   } catch {

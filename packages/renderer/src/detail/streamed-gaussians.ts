@@ -89,7 +89,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly bounds: Bounds;
   readonly pages: readonly GaussianPage[];
   /** Page requests of the views: for the renderer. */
-  readonly wishes: WishReader;
+  readonly pageRequests: WishReader;
   readonly #source: PageSource;
   readonly #options: PoolOptions;
   readonly #memory: GpuMemory;
@@ -129,7 +129,7 @@ export class StreamedGaussians implements GaussianScene {
     this.#memory = new GpuMemory(device);
     try {
       this.#pool = new PagePool(device, this.#memory, scene, size);
-      this.wishes = new WishReader(device, this.#memory, {
+      this.pageRequests = new WishReader(device, this.#memory, {
         pages: list.count,
         origin,
         aheadMs: () => aheadMs(this.#traffic.arrivalMs),
@@ -252,7 +252,7 @@ export class StreamedGaussians implements GaussianScene {
   destroy(): void {
     this.#isDestroyed = true;
     this.#traffic?.close();
-    this.wishes?.destroy();
+    this.pageRequests?.destroy();
     this.#reservation.release();
     this.#memory.destroy();
   }

@@ -1,5 +1,5 @@
 import type { Camera, Vector3 } from '@gaussian-splat/core';
-import type { NotedPage, Wishes, WishLevers } from '../gaussian-scene.js';
+import type { NotedPage, PageRequests, WishLevers } from '../gaussian-scene.js';
 import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { cameraValues } from '../view.js';
@@ -50,7 +50,7 @@ export interface WishReaderOptions {
 }
 
 /** Brings what views wish for back from the GPU, now and then, with nobody waiting for it. */
-export class WishReader implements Wishes {
+export class WishReader implements PageRequests {
   readonly #stage: NoteWishesStage;
   /** For each page the bits of the pixels that doing without it costs, a float32; at 0, the page that is always there, what the view lacks. Cleared before each look. */
   readonly #wishes: GPUBuffer;

@@ -26,8 +26,8 @@ export async function readPacked(
   scene: GaussianScene,
   check: () => void = () => undefined,
 ): Promise<PackedGaussians> {
-  const { shDegree, shPrecision, antialiased, filterVariance, origin, pages, wishes } = scene;
-  if (wishes) throw notWhole();
+  const { shDegree, shPrecision, antialiased, filterVariance, origin, pages, pageRequests } = scene;
+  if (pageRequests) throw notWhole();
   const stride = shWords(shDegree, shPrecision);
   const read = (name: 'geometry' | 'sh' | 'chunks', words: (count: number) => number): Promise<Uint32Array> =>
     readPages(

@@ -3,10 +3,10 @@ import { layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { FullScreenStage } from '../stages/full-screen.js';
-import { PictureTensor, type PictureShape } from './picture-tensor.js';
+import { ImageTensor, type ImageShape } from './picture-tensor.js';
 
 /** An image of a model on the GPU. */
-export interface ModelPicture {
+export interface ModelImage {
   readonly buffer: GPUBuffer;
   readonly dtype: 'float32' | 'float16';
   /** [1, 3, height, width]; a batch of one may be missing, and a fourth plane is not read. */
@@ -43,7 +43,7 @@ export class FilteredFrame {
   readonly #bindings = new Map<GPUBuffer, GPUBindGroup>();
   readonly #shown: Readonly<Record<'drawn' | 'filtered', GPUBindGroup>>;
   readonly #filteredView: GPUTextureView;
-  #tensor: PictureTensor | undefined;
+  #tensor: ImageTensor | undefined;
 
   constructor(device: GPUDevice, width: number, height: number) {
     this.width = width;
@@ -72,12 +72,12 @@ export class FilteredFrame {
    * Copies the drawn frame into a tensor for the model. The tensor, and the frame whose alpha the model's image gets, stay as they are until
    * the next call.
    */
-  handOver(shape: PictureShape): PictureTensor {
+  handOver(shape: ImageShape): ImageTensor {
     const { width, height, dtype, channels } = this.#tensor?.shape ?? {};
     const isSame = width === shape.width && height === shape.height && dtype === shape.dtype;
     if (!isSame || channels !== shape.channels) {
       this.#tensor?.destroy();
-      this.#tensor = new PictureTensor(this.#device, shape);
+      this.#tensor = new ImageTensor(this.#device, shape);
     }
     const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.hand-over' });
     const size = [this.width, this.height];
@@ -88,7 +88,7 @@ export class FilteredFrame {
   }
 
   /** Takes over what the model made of the frame handed over last; submits its work before it returns. */
-  accept({ buffer, dtype, dims }: ModelPicture): void {
+  accept({ buffer, dtype, dims }: ModelImage): void {
     const bytes = new ArrayBuffer(layouts.TensorToImage.size);
     writeStruct(
       layouts.TensorToImage,

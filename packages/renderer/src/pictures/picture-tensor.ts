@@ -6,7 +6,7 @@ import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 
 /** Size and element type of a tensor [views,channels,height,width]. */
-export interface PictureShape {
+export interface ImageShape {
   readonly width: number;
   readonly height: number;
   readonly dtype: 'float32' | 'float16';
@@ -20,14 +20,14 @@ export interface PictureShape {
  * How an image of another size gets into the tensor: `stretch` takes all of it, `cover` as much of its middle as has the tensor's
  * proportions.
  */
-export type PictureFit = 'stretch' | 'cover';
+export type ImageFit = 'stretch' | 'cover';
 
 /**
  * An image, or several, as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1 as they are encoded (sRGB), top row first, over
  * black where the image is transparent. Images of another size are resampled: bilinear, antialiased where they shrink.
  */
-export class PictureTensor {
-  readonly shape: PictureShape;
+export class ImageTensor {
+  readonly shape: ImageShape;
   /** [views, channels, height, width] */
   readonly dims: readonly [number, 3 | 4, number, number];
   /** The elements; float16 two to a word. */
@@ -46,7 +46,7 @@ export class PictureTensor {
    * @throws GaussianSplatError `out-of-memory/buffer-limit` for a size that the device does not allow; `argument/value` for several pictures of
    * float16 with an odd number of elements.
    */
-  constructor(device: GPUDevice, shape: PictureShape) {
+  constructor(device: GPUDevice, shape: ImageShape) {
     const { width, height, dtype, channels = 3, views = 1 } = shape;
     this.shape = shape;
     this.dims = [views, channels, height, width];
@@ -63,7 +63,7 @@ export class PictureTensor {
     this.#uniform = this.#memory.buffer('gs.picture.uniform', layouts.ImageToTensor.size, usage);
   }
 
-  get dtype(): PictureShape['dtype'] {
+  get dtype(): ImageShape['dtype'] {
     return this.shape.dtype;
   }
 
@@ -82,7 +82,7 @@ export class PictureTensor {
    * Textures with alpha hold premultiplied colours.
    * @param view which of several images it is, from 0
    */
-  write(texture: GPUTexture, fit: PictureFit = 'stretch', view = 0): void {
+  write(texture: GPUTexture, fit: ImageFit = 'stretch', view = 0): void {
     this.#writeUniform(texture.width, texture.height, fit, view);
     let bindings = this.#bindings.get(texture);
     if (bindings === undefined) {
@@ -101,7 +101,7 @@ export class PictureTensor {
    * Takes over what a browser can draw (an ImageBitmap, an image, a canvas, a frame of a video), without reading it back.
    * @throws GaussianSplatError `argument/value` for an image without pixels, or larger than the device's textures.
    */
-  upload(source: GPUCopyExternalImageSource, fit: PictureFit = 'cover', view = 0): void {
+  upload(source: GPUCopyExternalImageSource, fit: ImageFit = 'cover', view = 0): void {
     const { width, height } = sizeOf(source);
     const most = this.#device.limits.maxTextureDimension2D;
     if (!(width > 0 && height > 0 && width <= most && height <= most)) throw wrongSize(width, height, most);
@@ -122,7 +122,7 @@ export class PictureTensor {
     this.#memory.destroy();
   }
 
-  #writeUniform(width: number, height: number, fit: PictureFit, view: number): void {
+  #writeUniform(width: number, height: number, fit: ImageFit, view: number): void {
     const { width: columns, height: rows, dtype, channels = 3 } = this.shape;
     let [across, down] = [width / columns, height / rows];
     if (fit === 'cover') across = down = Math.min(across, down);

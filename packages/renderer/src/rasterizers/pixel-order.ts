@@ -11,7 +11,7 @@ import {
   type ComputeKernel,
   type ShaderDescription,
 } from '../gpu/kernel.js';
-import type { Levers } from '../levers.js';
+import type { RenderSettings } from '../levers.js';
 import type { Scratch } from '../scratch.js';
 import type { OrderedPainting, PaintingDepth } from './rasterizer.js';
 import { rasterizeKernel, type RasterizeKernel } from './tile-kernels.js';
@@ -39,7 +39,11 @@ export class PixelOrder {
   }
 
   /** @param scratch of the frame; undefined where only pipelines are wanted */
-  paintingOf({ orderWindow }: Pick<Levers, 'orderWindow'>, camera?: Camera, scratch?: Scratch): OrderedPainting {
+  paintingOf(
+    { orderWindow }: Pick<RenderSettings, 'orderWindow'>,
+    camera?: Camera,
+    scratch?: Scratch,
+  ): OrderedPainting {
     const own = { is_wide: +(orderWindow === 32), is_parallel: +(camera?.orthographic === true) };
     return {
       tilesKernel: (variant, depth) =>

@@ -19,7 +19,7 @@ type Program = ShaderProgram<typeof rasterizeQuads>;
 /** Hardware quads, back to front, blended into a float texture. */
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
-  readonly takesNotes = false;
+  readonly takesAuxiliary = false;
   readonly #device: GPUDevice;
   readonly #program: Program;
   readonly #format: AccumulationFormat;

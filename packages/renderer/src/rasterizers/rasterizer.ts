@@ -1,7 +1,7 @@
 import type { FrameTimer } from '../gpu/pass-timer.js';
 import type { Camera } from '@gaussian-splat/core';
 import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
-import type { Levers } from '../levers.js';
+import type { RenderSettings } from '../levers.js';
 import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
@@ -39,7 +39,7 @@ export interface Surface {
 }
 
 /** What a frame tells about itself on the way, besides its image. */
-export interface FrameNotes {
+export interface AuxiliaryOutputs {
   /**
    * One word for each splat, in the order of `packedOrder`, pages filled up to whole chunks of 256: the bits of the largest weight, alpha times
    * transmittance, that the splat has had in any pixel. Weights of earlier frames stay where they are larger: clear the buffer for those
@@ -53,8 +53,8 @@ export interface FrameNotes {
   readonly depth?: GPUTexture;
 }
 
-/** What a frame that took notes was painted from, for passes that go over it again. All of it is the renderer's: to be read before the next frame. */
-export interface NotedFrame {
+/** What a frame with auxiliary outputs was painted from, for passes that go over it again. All of it is the renderer's: to be read before the next frame. */
+export interface AuxiliaryFrame {
   /** `BinView` of shaders/shared/bins.wgsl. */
   readonly view: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
@@ -65,7 +65,7 @@ export interface NotedFrame {
   readonly tile_bits: GPUBuffer;
   /** array<vec2u>: of each bin the first pair, and the one behind the last. */
   readonly ranges: GPUBuffer;
-  /** Numbers of the splats by slot, as {@link FrameNotes.contributions} counts them. */
+  /** Numbers of the splats by slot, as {@link AuxiliaryOutputs.contributions} counts them. */
   readonly survivors: GPUBuffer;
 }
 
@@ -76,7 +76,7 @@ export interface PaintingDepth {
     camera: Camera,
     drawn: { readonly width: number; readonly height: number },
     rasterizer: RasterizerName,
-    notes: FrameNotes | undefined,
+    auxiliary: AuxiliaryOutputs | undefined,
   ): void;
   tilesKernel(variant: RasterizeVariant): RasterizeKernel;
   bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
@@ -107,13 +107,13 @@ export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, '
   ): GPUBindGroup;
 }
 
-/** Levers that rasterizers know. */
-export type PaintingLevers = Pick<Levers, 'transmittanceMin'>;
+/** Settings that rasterizers know. */
+export type PaintingLevers = Pick<RenderSettings, 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {
-  readonly notes?: FrameNotes | undefined;
-  /** Numbers of the visible splats by slot; with {@link notes}. */
+  readonly auxiliary?: AuxiliaryOutputs | undefined;
+  /** Numbers of the visible splats by slot; with {@link auxiliary}. */
   readonly survivors?: GPUBuffer | undefined;
   readonly surface: Surface;
   readonly levers: PaintingLevers;
@@ -142,14 +142,14 @@ export interface Slice {
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
-  /** True if it can take {@link FrameNotes}. */
-  readonly takesNotes: boolean;
+  /** True if it can take {@link AuxiliaryOutputs}. */
+  readonly takesAuxiliary: boolean;
   /** Bytes of GPU memory held. */
   readonly byteLength: number;
   /** `Plan` of the pairs of splat and bin, where there are pairs. */
   readonly pairPlan?: GPUBuffer;
-  /** What the last frame that took notes was painted from. */
-  readonly noted?: NotedFrame;
+  /** What the last frame with auxiliary outputs was painted from. */
+  readonly auxiliary?: AuxiliaryFrame;
   /** True if the rasterizer can write a final image of this format by itself. */
   finishes(format: GPUTextureFormat): boolean;
   /** Bytes of each buffer of {@link RasterizerInputs.spare} that it needs. */

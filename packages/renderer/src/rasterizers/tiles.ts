@@ -7,8 +7,8 @@ import type { Threads } from '../stages/plan.js';
 import { TRAINED_TRANSMITTANCE } from '../levers.js';
 import type {
   AccumulationFormat,
-  FrameNotes,
-  NotedFrame,
+  AuxiliaryOutputs,
+  AuxiliaryFrame,
   OrderedPainting,
   Painting,
   PaintingLevers,
@@ -73,7 +73,7 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
-  readonly takesNotes = true;
+  readonly takesAuxiliary = true;
   readonly #device: GPUDevice;
   readonly #accumulation: AccumulationFormat;
   readonly #memory: GpuMemory;
@@ -86,9 +86,9 @@ export class TilesRasterizer implements Rasterizer {
   #buffers: PairBuffers | undefined;
   /** By the number of bins across and down: pictures in motion may have fewer pixels. */
   readonly #bound = new Map<string, GridBindings>();
-  /** Where notes go that nobody asked for. */
-  #nowhere: Required<FrameNotes> | undefined;
-  #noted: NotedFrame | undefined;
+  /** Where auxiliary outputs go that no caller asked for. */
+  #nowhere: Required<AuxiliaryOutputs> | undefined;
+  #noted: AuxiliaryFrame | undefined;
 
   constructor(device: GPUDevice, accumulation: AccumulationFormat, threads: Threads) {
     this.#device = device;
@@ -108,7 +108,7 @@ export class TilesRasterizer implements Rasterizer {
     return this.#buffers?.plan;
   }
 
-  get noted(): NotedFrame | undefined {
+  get auxiliary(): AuxiliaryFrame | undefined {
     return this.#noted;
   }
 
@@ -155,7 +155,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, notes, survivors, timer, depth, depths, ordered } = painting;
+    const { surface, levers, background, auxiliary, survivors, timer, depth, depths, ordered } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
     const { format, width, height } = surface;
@@ -168,7 +168,7 @@ export class TilesRasterizer implements Rasterizer {
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
     const variant = {
-      ...{ format, isFinal: background !== undefined, isNoting: notes !== undefined },
+      ...{ format, isFinal: background !== undefined, isNoting: auxiliary !== undefined },
       refusesLast: refusesLast(levers),
     };
     const kernel =
@@ -178,8 +178,8 @@ export class TilesRasterizer implements Rasterizer {
       ordered?.bindTiles(kernel, this.#painted(bound, surface.view), depth) ??
       (depth && depths
         ? depth.bindTiles(kernel, this.#painted(bound, surface.view), depths)
-        : notes && survivors
-          ? this.#bindNoting(kernel, bound, surface.view, { ...notes, survivors })
+        : auxiliary && survivors
+          ? this.#bindNoting(kernel, bound, surface.view, { ...auxiliary, survivors })
           : this.#imageBindings(kernel, bound, surface.view));
     kernel.dispatchGrid(paint, image, columns, rows);
     paint.end();
@@ -266,12 +266,12 @@ export class TilesRasterizer implements Rasterizer {
     };
   }
 
-  /** Bound anew for each frame: notes are not for every frame. */
+  /** Bound anew for each frame: auxiliary outputs are not for every frame. */
   #bindNoting(
     kernel: RasterizeKernel,
     bound: GridBindings,
     image: GPUTextureView,
-    { contributions, depth, survivors }: FrameNotes & { readonly survivors: GPUBuffer },
+    { contributions, depth, survivors }: AuxiliaryOutputs & { readonly survivors: GPUBuffer },
   ): GPUBindGroup {
     this.#nowhere ??= {
       contributions: this.#memory.buffer('gs.rasterize.no_contributions', 4, BUFFER_USAGE.storage),

@@ -117,7 +117,7 @@ export async function atRest(element: GaussianSplatElement, quietMs = 400, limit
   let [seen, since] = [submits, performance.now()];
   const isQuiet = (): boolean => {
     const now = performance.now();
-    if (submits !== seen || element.stats?.pace.drawn !== 'whole') [seen, since] = [submits, now];
+    if (submits !== seen || element.stats?.dynamicQuality.drawn !== 'whole') [seen, since] = [submits, now];
     return now - since > quietMs;
   };
   await until(isQuiet, 'the true image', limitMs);
