@@ -4,15 +4,22 @@ import { join } from 'node:path';
 import { root } from './run.mjs';
 
 /**
- * The laboratory: tools that look for fewer splats or measure others, in all their breadth. `npm run test:lab` runs these; `npm test` keeps
- * a smoke test of each tool and every behaviour of the product.
+ * The laboratory, by `npm run test:lab`: tools that look for fewer splats or measure others, in all their breadth; what is judged by a clock; the same again in
+ * another framework, another family of models, on another screen, or a hundred times. `npm test` keeps a smoke test of each tool and every behaviour of the product.
  */
 const LABORATORY = [
   /^tests\/economise\/(?!command|live-mask)/,
   /^tests\/bench\/(scene|pages)/,
-  /^tests\/frameworks\/browser\/(react-strict|vue|scenes-vue)/,
+  /^tests\/frameworks\/browser\/(plain|react-strict|vue|scenes-vue)/,
   /^tests\/site\/(compare|cost-card|playground)/,
-  /^tests\/generator\/browser\/(scenes|examples\/(plant|walker))/,
+  /^tests\/check\/browser\//,
+  // Clocks, large files, long lives, a dense screen and the controls of others.
+  /^tests\/element\/browser\/(high-density|lives|loads-apart|media-chrome|pace|previews)/,
+  // Every family and the examples; the mechanism is tested by session, proof, shapes and element.
+  /^tests\/generator\/browser\/(examples\/|families|orbit|picture-pair|post-unreachable|provider|scenes)/,
+  // Stages and WebGL are tested in Node and in the element; losses of the device in device.
+  /^tests\/stages\/browser\//,
+  /^tests\/stability\/browser\/(device-loss|gpu-crash|resize)/,
 ];
 /** Tests in Chromium that look at what happens in time: no other page runs beside them. */
 const TIMING = [
@@ -44,7 +51,7 @@ const OWN_PROCESS = [
 const TAKES_DEVICE = /from '[./]*support\/(node-device|read-rows|draw-until-calm|work-counters)\.js'/;
 
 /** Files of Node without a device that leave their process as it was share another: to start one takes longer than most of them. */
-const SHARES_PROCESS = /^tests\/(check|contract|element|formats|generator|onnx|oracle)\//;
+const SHARES_PROCESS = /^tests\/(?!economise|packages)/;
 const CHANGES_PROCESS =
   /\b(globalThis|mock|memoryUsage)\b|\bprocess\.(?!platform|execPath|cwd|env\.\w+\b(?! =))|performance\.now =|support\/(node-device|devices)|node-gpu/;
 
@@ -74,7 +81,7 @@ export const isLaboratory = (file) => LABORATORY.some((pattern) => pattern.test(
 
 /** Whether some tests of a file are the laboratory's (`onlyInLab` of tests/support/extent.ts). */
 export const hasBreadth = (file) =>
-  /\bonlyInLab\b|\bisLab\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
+  /\bonlyInLab\b|\bisLab\b|\bsomeOf\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
 
 /** Files of Node: those that share a device, those that share a process, and those that have one each. */
 export function byProcess(files) {

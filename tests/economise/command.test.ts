@@ -11,7 +11,7 @@ import { encodingsFor, viewsAround } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { writeWhole } from '../../packages/cli/src/lib/output-file.mjs';
 import { smallCloud } from '../formats/support/small-cloud.js';
-import { onlyInLab } from '../support/extent.js';
+import { onlyInLab, someOf } from '../support/extent.js';
 
 const script = fileURLToPath(new URL('../../packages/cli/bin/gaussian-splat.mjs', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'economise-'));
@@ -47,14 +47,15 @@ function command(...args: string[]): { status: number | null; said: string } {
 test('files that it reads are none that it writes, by whatever name', () => {
   symlinkSync(scene, join(folder, 'link.ply'));
   linkSync(scene, join(folder, 'twin.ply'));
-  for (const [args, reason] of [
+  const cases = [
     [['--out', 'scene.ply'], /--out: expected another file than SCENE/],
     [['--out', 'link.ply'], /--out: expected another file than SCENE/],
     [['--out', 'twin.ply'], /--out: expected another file than SCENE/],
     [['--out', 'a.glb', '--report', 'scene.ply'], /--report: expected another file than SCENE/],
     [['--out', 'a.glb', '--views', 'views.json', '--report', './views.json'], /--report: .* that of --views/],
     [['--out', 'a.glb', '--report', 'a.glb'], /--report: expected another file than that of --out/],
-  ] as const) {
+  ] as const;
+  for (const [args, reason] of someOf<(typeof cases)[number]>(cases, 3)) {
     const { status, said } = command('scene.ply', '--min-db', '40', ...args);
     assert.equal(status, 2, said);
     assert.match(said, reason);
@@ -65,7 +66,7 @@ test('files that it reads are none that it writes, by whatever name', () => {
 test('what cannot be written or read is said before the work, for people', () => {
   writeFileSync(join(folder, 'cameras.json'), '{"cameras": []}');
   writeFileSync(join(folder, 'prose.json'), 'hello');
-  for (const [args, status, reason] of [
+  const cases = [
     [['none.ply', '--out', 'nowhere/a.glb'], 2, /--out: the folder .*nowhere does not exist/],
     [['none.ply', '--out', 'a.glb', '--report', '.'], 2, /--report: .* is a folder/],
     [['none.ply', '--out', 'a.obj'], 1, /expected a name that ends in .*\[argument\/value\]/],
@@ -73,7 +74,8 @@ test('what cannot be written or read is said before the work, for people', () =>
     [['scene.ply', '--out', 'a.glb', '--views', 'cameras.json'], 2, /found no list "views"/],
     [['scene.ply', '--out', 'a.glb', '--views', 'prose.json'], 2, /prose\.json is no JSON/],
     [['scene.ply', '--out', 'a.glb', '--views', '.'], 1, /^EISDIR/m],
-  ] as const) {
+  ] as const;
+  for (const [args, status, reason] of someOf<(typeof cases)[number]>(cases, 3)) {
     const found = command('--min-db', '40', ...args);
     assert.equal(found.status, status, found.said);
     assert.match(found.said, reason);

@@ -10,5 +10,14 @@ export const onlyInFull: string | false = isFull ? false : 'runs in npm test -- 
 /** Whether the laboratory runs: once a day's work, and before a release. */
 export const isLab = isFull || process.env.TESTS === 'lab';
 
+/**
+ * Some of the cases of a test, evenly chosen: all of them in the laboratory.
+ * @param count how many `npm test` keeps
+ */
+export function someOf<T>(cases: readonly T[], count: number): readonly T[] {
+  if (isLab || cases.length <= count) return cases;
+  return Array.from({ length: count }, (_, k) => cases[Math.floor((k * cases.length) / count)]);
+}
+
 /** For the options of a test that the daily run leaves to the laboratory. */
 export const onlyInLab: string | false = isLab ? false : 'runs in npm run test:lab';
