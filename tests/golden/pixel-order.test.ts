@@ -14,7 +14,7 @@ import {
   World,
   type RendererOptions,
 } from '@gaussian-splat/renderer';
-import { renderOracle, renderOracleWorld, toRgba, type Mode } from '../oracle/oracle.js';
+import { renderOracle, renderOracleWorld, type Mode } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, describeCloseness, renderCloud } from '../support/compare.js';
