@@ -4,7 +4,7 @@
  * And for bundlers, in the package: the worker as text, a module for each chunk, and as one file (src/loading/own-worker.ts); and the element as
  * short as for CDNs, for those that build for production.
  */
-import { cpSync, mkdirSync, rmSync } from 'node:fs';
+import { cpSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -36,20 +36,23 @@ const shortText = {
   renderChunk: (code) => transform(code, { format: 'esm', target: 'es2022', minify: true, legalComments: 'inline' }),
 };
 
-/** TypeScript takes them from the sources and leaves them there. */
-const typesOfThree = {
-  name: 'types-of-three',
-  writeBundle: () => cpSync(path('./src/meshes/three.d.ts'), path('./dist/meshes/three.d.ts')),
-};
-
-/** three.js comes short, and is most of what there is: to make it shorter once more takes longer than all else. */
-const hasThree = ({ moduleIds }) => moduleIds.includes(path('./dist/meshes/three.js'));
-const butThree = (plugin) => ({
-  ...plugin,
-  renderChunk(code, chunk, ...rest) {
-    return hasThree(chunk) ? null : plugin.renderChunk.call(this, code, chunk, ...rest);
+/** three.js, as much of it as meshes need, is one file of the CDN build. The package's own module is that file, whose types stay with the sources. */
+const THREE = 'three.js of the CDN build';
+let threeFile = '';
+const threeOfPackage = {
+  name: 'three-of-package',
+  writeBundle(_, bundle) {
+    threeFile = Object.values(bundle).find(({ isEntry }) => isEntry).fileName;
+    mkdirSync(path('./dist/meshes'), { recursive: true });
+    writeFileSync(path('./dist/meshes/three.js'), `export * from '../../cdn/${threeFile}';\n`);
+    cpSync(path('./src/meshes/three.d.ts'), path('./dist/meshes/three.d.ts'));
   },
-});
+};
+const threeBeside = {
+  name: 'three-beside',
+  resolveId: (id, importer) =>
+    id === './three.js' && importer?.startsWith(path('./dist/meshes/')) ? { id: THREE, external: true } : null,
+};
 
 const sources = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
@@ -60,30 +63,15 @@ const sources = [
 ];
 const plugins = [
   ...sources,
-  butThree(shortPrivates),
+  shortPrivates,
   // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
-  butThree(
-    terser({
-      module: true,
-      ecma: 2022,
-      compress: { passes: 4, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
-      format: { comments: false },
-    }),
-  ),
+  terser({
+    module: true,
+    ecma: 2022,
+    compress: { passes: 4, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
+    format: { comments: false },
+  }),
 ];
-
-/** three.js has sources of its own: a map of them would weigh more than all else in the package. */
-const noMapOfThree = {
-  name: 'no-map-of-three',
-  generateBundle(_options, bundle) {
-    for (const chunk of Object.values(bundle)) {
-      if (!chunk.moduleIds || !hasThree(chunk)) continue;
-      delete bundle[`${chunk.fileName}.map`];
-      chunk.code = chunk.code.replace(/\n\/\/# sourceMappingURL=\S+\s*$/, '\n');
-      chunk.map = null;
-    }
-  },
-};
 
 /** Here the worker's script lies beside the element's. */
 const workerBeside = {
@@ -130,10 +118,15 @@ const output = {
 
 export default [
   {
-    // three.js, as much as meshes need: a package of 24 MB otherwise.
+    // A package of 24 MB otherwise. Without a map: three.js has sources of its own.
     input: { three: path('./scripts/three.mjs') },
-    plugins: [nodeResolve({ exportConditions: ['production', 'browser'] }), shortText, typesOfThree],
-    output: { dir: path('./dist/meshes'), format: 'es', entryFileNames: '[name].js', chunkFileNames: '[name].js' },
+    plugins: [emptyFirst, nodeResolve({ exportConditions: ['production', 'browser'] }), shortText, threeOfPackage],
+    output: {
+      dir: path('./cdn'),
+      format: 'es',
+      entryFileNames: '[name]-[hash].js',
+      chunkFileNames: '[name]-[hash].js',
+    },
   },
   {
     input: { 'gaussian-splat.min': path('./dist/index.js') },
@@ -141,12 +134,12 @@ export default [
     external: (id) => id.endsWith('scene-worker.js'),
     // What generators need is a chunk of its own, loaded when the first is shown; it finds the runtime beside itself.
     preserveEntrySignatures: 'allow-extension',
-    plugins: [emptyFirst, workerBeside, ...plugins, noMapOfThree, copyOthers],
+    plugins: [workerBeside, threeBeside, ...plugins, copyOthers],
     // What two chunks share and is smaller than a request for it goes where the page has it already.
     output: {
       ...output,
       chunkFileNames: (chunk) => `${nameOf(chunk)}-[hash].js`,
-      paths: () => './scene-worker.js',
+      paths: (id) => (id === THREE ? `./${threeFile}` : './scene-worker.js'),
       experimentalMinChunkSize: 500,
     },
   },
