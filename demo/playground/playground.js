@@ -3,8 +3,9 @@ import { copy } from '../site/copy.js';
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { viewOf } from '../site/view.js';
 import { Children } from './children.js';
+import { Crop } from './crop.js';
 import { faultOf, showFault } from './faults.js';
-import { frameOf, pageOf, sceneOf, scriptOf } from './html.js';
+import { frameOf, pageOf, sceneOf, scriptOf, tagsOf } from './html.js';
 import { askForLevel, turnedOver } from './level.js';
 import { pickPoint } from './pick.js';
 import { alignSliders, connectSliders } from './sliders.js';
@@ -27,6 +28,7 @@ let local = { name: '', address: '' };
 /** The name of the poster that was saved. */
 let savedPoster = '';
 const children = new Children(scene, byId('children'), show);
+const crop = new Crop(scene, form.elements.crop, form.querySelectorAll('[data-side]'), show);
 
 /** What the fields say: `[name, value]`, true for a bare attribute. Empty fields, and values that the element would not take, set nothing; `alt` and `src` come first. */
 function chosen() {
@@ -43,23 +45,40 @@ const rankOf = (name) => (FIRST.includes(name) ? FIRST.indexOf(name) : FIRST.len
 function show() {
   const attributes = chosen();
   for (const field of form.elements) {
-    const { name } = field;
-    if (!name) continue;
-    if (field.type !== 'checkbox') showFault(field, faultOf(name, field.value.trim()));
-    const [, value] = attributes.find(([each]) => each === name) ?? [];
-    setAttribute(name, name === 'src' && value === local.name ? local.address : value);
+    const { name, type, value } = field;
+    if (name && type !== 'checkbox') showFault(field, faultOf(name, value.trim()));
   }
+  const tags = tagsOf(attributes);
+  // One that is moved from tag to tag is loaded again: first it goes, so that it is never there twice.
+  if (tags.scene === null) cropped?.remove();
+  setAttributes(scene, tags.element);
+  if (tags.scene !== null) setAttributes((cropped ??= document.createElement('splat-scene')), tags.scene);
+  if (tags.scene !== null && !cropped.isConnected) scene.append(cropped);
   alignSliders(form);
+  crop.align();
   byId('html').textContent = `${scriptOf(CDN)}\n${sceneHtml(attributes)}`;
   byId('copied').textContent = '';
   remember(attributes);
 }
 
-function setAttribute(name, value) {
+/** The scene's own tag, once it has been cropped. */
+let cropped;
+
+/** Sets what is given, and removes every other attribute that the form has a field for. */
+function setAttributes(element, attributes) {
+  const values = new Map(attributes);
+  for (const { name } of form.elements) {
+    if (!name) continue;
+    const value = values.get(name);
+    setAttribute(element, name, name === 'src' && value === local.name ? local.address : value);
+  }
+}
+
+function setAttribute(element, name, value) {
   const wanted = value === true ? '' : (value ?? null);
-  if (wanted === scene.getAttribute(name)) return;
-  if (wanted === null) scene.removeAttribute(name);
-  else scene.setAttribute(name, wanted);
+  if (wanted === element.getAttribute(name)) return;
+  if (wanted === null) element.removeAttribute(name);
+  else element.setAttribute(name, wanted);
 }
 
 /** The tag to paste, with labels, views, and the poster that was saved. */
@@ -190,11 +209,17 @@ scene.addEventListener('load', () => {
   const { splats, bytes } = scene.statistics;
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
   for (const button of document.querySelectorAll('.result button')) button.disabled = false;
+  crop.measure();
 });
 scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
 for (const type of ['error', 'generator-error']) {
   scene.addEventListener(type, ({ detail }) => (byId('status').textContent = detail.message));
 }
+// A box belongs to the scene that it was made for.
+form.elements.src.addEventListener('change', () => {
+  form.elements.crop.value = '';
+  crop.forget();
+});
 form.addEventListener('change', show);
 form.addEventListener('input', ({ target }) => {
   // An address is no address before it is complete.
@@ -221,6 +246,7 @@ byId('copy').addEventListener('click', async () => {
 byId('reset').addEventListener('click', () => {
   asking.abort();
   form.reset();
+  crop.forget();
   children.clear();
   savedPoster = '';
   show();
@@ -230,7 +256,8 @@ takeFiles(document.documentElement, (file) => {
   local = { name: file.name, address: addressOf(file) };
   form.elements.src.value = file.name;
   form.elements.alt.value = '';
-  for (const name of VIEW) form.elements[name].value = '';
+  for (const name of [...VIEW, 'crop']) form.elements[name].value = '';
+  crop.forget();
   children.clear();
   savedPoster = '';
   show();
