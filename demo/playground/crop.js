@@ -1,4 +1,4 @@
-/** A box that hides what lies around a scene: six sliders in the directions that visitors see, and the text of `crop`, which is in the axes of the file. */
+/** Six sliders for the sides of a box, in the directions that visitors see, and the text of `crop`, which is in the axes of the file. */
 import { toScene, viewerFrame } from '../../packages/element/dist/camera/orbit.js';
 import { boxGrammar } from '../../packages/element/dist/composition/grammar.js';
 import { upNow } from './level.js';
@@ -18,7 +18,7 @@ export class Crop {
   #scene;
   #field;
   #sliders;
-  /** What the sliders go across, in the axes of the file: the scene as it was loaded without a box. */
+  /** From end to end of the sliders, in the axes of the file: nearly all of the scene. */
   #whole;
 
   /**
@@ -38,17 +38,17 @@ export class Crop {
       });
   }
 
-  /** Another scene will come: its box is not known yet. */
+  /** A scene begins to load: its size is not known yet, unless it is the one that has just been cropped. */
   forget() {
-    this.#whole = undefined;
+    if (this.#read() === undefined) this.#whole = undefined;
     this.#enable();
   }
 
-  /** A scene is shown. One that a box cuts already tells no more of itself than this box, so that there is some room around it. */
+  /** A scene is shown. Of one that was cropped before only what is left is known: the sliders go half its size farther. */
   measure() {
-    const crop = this.#read();
-    if (crop === undefined) this.#whole = fileBoxOf(this.#scene);
-    else this.#whole ??= around(crop);
+    const box = fileBoxOf(this.#scene);
+    if (box !== null && this.#read() === undefined) this.#whole = box;
+    else if (box !== null) this.#whole ??= around(box);
     this.#enable();
     this.align();
   }
@@ -75,39 +75,61 @@ export class Crop {
   }
 
   #write(slider) {
-    const { min, max } = this.#read() ?? this.#whole;
+    const { min, max } = this.#read() ?? farAround(this.#whole);
     const box = { min: [...min], max: [...max] };
-    const { axis, corner, isTurned } = this.#sideOf(slider);
+    const { axis, corner, end, isTurned } = this.#sideOf(slider);
     const share = slider.valueAsNumber / 100;
     const [least, most] = [this.#whole.min[axis], this.#whole.max[axis]];
     box[corner][axis] = least + (isTurned ? 1 - share : share) * (most - least);
     // A side that has gone past the one across takes it along.
     const isPast = box.min[axis] > box.max[axis];
     if (isPast) box[OTHER[corner]][axis] = box[corner][axis];
-    this.#field.value = [...box.min, ...box.max].map((value) => Number(value.toFixed(3))).join(' ');
+    // At the end of its slider a side cuts nothing, not even the sky.
+    if (share === (end === 'max' ? 1 : 0)) box[corner][axis] = farAround(this.#whole)[corner][axis];
+    this.#field.value = [...box.min, ...box.max].map((value) => Number(value.toPrecision(5))).join(' ');
     this.align();
   }
 
-  /** Which number of the file's box a slider stands for. Where the file is tilted, the nearest. */
+  /** Which number of the file's box a slider stands for. */
   #sideOf(slider) {
     const [row, end] = SIDES[slider.dataset.side];
-    const direction = viewerFrame(upNow(this.#scene))[row];
-    const sizes = direction.map(Math.abs);
-    const axis = sizes.indexOf(Math.max(...sizes));
-    const isTurned = direction[axis] < 0;
-    return { axis, corner: isTurned ? OTHER[end] : end, isTurned };
+    const frame = viewerFrame(upNow(this.#scene));
+    const axis = axesOf(frame)[row];
+    const isTurned = frame[row][axis] < 0;
+    return { axis, corner: isTurned ? OTHER[end] : end, end, isTurned };
   }
 }
 
-/** The box around a scene, in the axes of its file. */
+/** The axes of the file that are nearest to the three directions of viewer space, each of them once: a file may be tilted. Up chooses first. */
+function axesOf(frame) {
+  const axes = [];
+  for (const row of [1, 0, 2]) {
+    const free = [0, 1, 2].filter((axis) => !axes.includes(axis));
+    axes[row] = free.reduce((best, axis) => (Math.abs(frame[row][axis]) > Math.abs(frame[row][best]) ? axis : best));
+  }
+  return axes;
+}
+
+/** The box around a scene, in the axes of its file; null where it is not known. */
 function fileBoxOf(scene) {
-  const { min, max } = scene.getBoundingBox();
+  const box = scene.getBoundingBox();
+  if (box === null) return null;
+  const { min, max } = box;
   const frame = viewerFrame(upNow(scene));
   const corners = Array.from({ length: 8 }, (_, i) =>
     toScene(frame, [i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z]),
   );
   const of = (pick) => [0, 1, 2].map((axis) => pick(...corners.map((corner) => corner[axis])));
   return { min: of(Math.min), max: of(Math.max) };
+}
+
+/** A hundred times the size of a box farther out: holds what lies far behind a capture. */
+function farAround({ min, max }) {
+  const far = min.map((least, axis) => 100 * (max[axis] - least));
+  return {
+    min: min.map((least, axis) => Math.floor(least - far[axis])),
+    max: max.map((most, axis) => Math.ceil(most + far[axis])),
+  };
 }
 
 function around({ min, max }) {

@@ -20,7 +20,7 @@ const LISTS = ['chain', 'postprocess'];
 /** The element's build, which this site has, too. */
 const CDN = new URL('../cdn/', document.baseURI).href;
 /** What is fetched as soon as it changes. */
-const LOADED = ['src', 'views', ...ADDRESSES, ...LISTS];
+const LOADED = ['src', 'crop', 'views', ...ADDRESSES, ...LISTS];
 const VIEW = ['camera-orbit', 'camera-target', 'field-of-view'];
 
 /** The file that was dropped, while its name stands in the field of the source. */
@@ -48,12 +48,7 @@ function show() {
     const { name, type, value } = field;
     if (name && type !== 'checkbox') showFault(field, faultOf(name, value.trim()));
   }
-  const tags = tagsOf(attributes);
-  // One that is moved from tag to tag is loaded again: first it goes, so that it is never there twice.
-  if (tags.scene === null) cropped?.remove();
-  setAttributes(scene, tags.element);
-  if (tags.scene !== null) setAttributes((cropped ??= document.createElement('splat-scene')), tags.scene);
-  if (tags.scene !== null && !cropped.isConnected) scene.append(cropped);
+  setTags(tagsOf(attributes));
   alignSliders(form);
   crop.align();
   byId('html').textContent = `${scriptOf(CDN)}\n${sceneHtml(attributes)}`;
@@ -61,8 +56,37 @@ function show() {
   remember(attributes);
 }
 
-/** The scene's own tag, once it has been cropped. */
-let cropped;
+/** The tag of a scene that is cropped. */
+const cropped = document.createElement('splat-scene');
+
+/** A scene that changes its tag is loaded again. It leaves the one before it comes to the other, so that its memory is not taken twice. */
+function setTags(tags) {
+  const isCropped = tags.scene !== null;
+  if (isCropped !== cropped.isConnected) kept = turnedTo();
+  if (!isCropped) cropped.remove();
+  setAttributes(scene, tags.element);
+  setAttributes(cropped, tags.scene ?? []);
+  if (isCropped && !cropped.isConnected) scene.append(cropped);
+}
+
+/** Whether a visitor has moved the camera since the fields last said where it is. */
+let isTurned = false;
+/** The view that comes back once the scene is loaded again. */
+let kept;
+
+/** Where a visitor has moved the camera, as `flyTo()` takes it. */
+function turnedTo() {
+  if (!isTurned) return undefined;
+  const [orbit, target, fieldOfView] = [scene.getCameraOrbit(), scene.getCameraTarget(), scene.getFieldOfView()];
+  return { orbit: String(orbit), target: String(target), fieldOfView: String(fieldOfView) };
+}
+
+/** Frames what is left of the scene, as a page with this HTML would; a visitor's view stays. */
+async function frameAgain() {
+  const view = turnedTo();
+  await scene.updateFraming();
+  if (view) await scene.flyTo(view, { duration: 0 });
+}
 
 /** Sets what is given, and removes every other attribute that the form has a field for. */
 function setAttributes(element, attributes) {
@@ -135,6 +159,7 @@ async function copyUnlessLocal(textOf) {
 /** The other way up: files such as SPZ do not say which, and tools do not agree. */
 function flip() {
   asking.abort();
+  isTurned = false;
   for (const name of VIEW) form.elements[name].value = '';
   form.elements.up.value = turnedOver(scene);
   show();
@@ -149,6 +174,7 @@ async function level() {
   const say = (sentence) => (byId('copied').textContent = sentence);
   try {
     const up = await askForLevel(scene, say, asking.signal);
+    isTurned = false;
     for (const name of VIEW) form.elements[name].value = '';
     form.elements.up.value = up;
     show();
@@ -210,19 +236,32 @@ scene.addEventListener('load', () => {
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
   for (const button of document.querySelectorAll('.result button')) button.disabled = false;
   crop.measure();
+  if (kept) scene.flyTo(kept, { duration: 0 });
+  kept = undefined;
 });
-scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
+scene.addEventListener('loadstart', () => {
+  byId('status').textContent = 'Loading';
+  crop.forget();
+});
+scene.addEventListener('camera-change', ({ detail }) => (isTurned ||= detail.source === 'user-interaction'));
 for (const type of ['error', 'generator-error']) {
-  scene.addEventListener(type, ({ detail }) => (byId('status').textContent = detail.message));
+  scene.addEventListener(type, ({ detail }) => {
+    byId('status').textContent = detail.message;
+    kept = undefined;
+  });
 }
 // A box belongs to the scene that it was made for.
 form.elements.src.addEventListener('change', () => {
   form.elements.crop.value = '';
-  crop.forget();
+  isTurned = false;
 });
-form.addEventListener('change', show);
+form.addEventListener('change', ({ target }) => {
+  if (VIEW.includes(target.name ?? '')) isTurned = false;
+  show();
+  if (target.name === 'crop' || target.dataset.side) void frameAgain();
+});
 form.addEventListener('input', ({ target }) => {
-  // An address is no address before it is complete.
+  // An address is no address before it is complete, and a box that is no box would load the scene again.
   if (target.type !== 'range' && !LOADED.includes(target.name)) show();
 });
 connectSliders(form, show);
@@ -246,7 +285,7 @@ byId('copy').addEventListener('click', async () => {
 byId('reset').addEventListener('click', () => {
   asking.abort();
   form.reset();
-  crop.forget();
+  isTurned = false;
   children.clear();
   savedPoster = '';
   show();
@@ -257,7 +296,7 @@ takeFiles(document.documentElement, (file) => {
   form.elements.src.value = file.name;
   form.elements.alt.value = '';
   for (const name of [...VIEW, 'crop']) form.elements[name].value = '';
-  crop.forget();
+  isTurned = false;
   children.clear();
   savedPoster = '';
   show();

@@ -252,8 +252,18 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await boxIs([-2, 2, -2, 2]);
     await tab.locator('summary', { hasText: 'Crop' }).click();
     await tab.waitForFunction(() => !document.querySelector<HTMLInputElement>('[data-side=right]')!.disabled);
+    await tab.evaluate(() => document.querySelector<HTMLElement>('gaussian-splat')!.focus());
+    await tab.keyboard.press('ArrowRight');
+    const [turned] = (await stateOf(tab)).view;
     await tab.locator('[data-side=right]').fill('25');
     await boxIs([-2, -1, -2, 2]);
+    await tab.waitForFunction(
+      (wanted) => String(document.querySelector<Splat>('gaussian-splat')!.getCameraOrbit()) === wanted,
+      turned,
+      PATIENCE,
+    );
+    // A side at the end of its slider is far out: nothing of a sky goes.
+    assert.ok(Number((await tab.inputValue('#attribute-crop')).split(' ')[0]) < -100);
     // Towards the camera: z of viewer space, and -z of the file.
     await tab.locator('[data-side=front]').fill('50');
     await boxIs([-2, -1, -2, 0]);
@@ -266,8 +276,10 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.equal(await tab.inputValue('#attribute-crop'), text);
     assert.equal(await tab.locator('splat-scene').getAttribute('up'), 'y');
     await tab.fill('#attribute-crop', '1 1 1 0 0 0');
+    await tab.locator('#attribute-crop').blur();
     assert.match((await tab.locator('#attribute-crop-fault').textContent())!, /the least first/);
     await tab.fill('#attribute-crop', '');
+    await tab.locator('#attribute-crop').blur();
     await boxIs([-2, 2, -2, 2]);
     assert.equal(await tab.locator('splat-scene').count(), 0);
 
@@ -275,6 +287,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.fill('#attribute-src', COMPASS);
     await tab.locator('#attribute-src').blur();
     await tab.fill('#attribute-crop', '0 -9 -9 9 9 9');
+    await tab.locator('#attribute-crop').blur();
     await tab.waitForFunction(() => document.querySelector('splat-scene'));
     const { pathname, search } = new URL(tab.url());
     const { tab: other, faults: others } = await open.visit(pathname + search, {

@@ -45,8 +45,8 @@ afterEach(async () => {
   await emulateMedia({ colorScheme: 'light', forcedColors: 'none', reducedMotion: 'no-preference' });
 });
 
-it('axe finds nothing in them in light, dark and forced colours', async () => {
-  const { element } = await showAll();
+it('axe finds nothing in them in light, dark and forced colours; the keyboard reaches each, and is in the scene again after the button that goes', async () => {
+  const { element, child } = await showAll();
   document.documentElement.style.colorScheme = 'light dark';
   const looks = [
     { colorScheme: 'light', forcedColors: 'none' },
@@ -62,10 +62,7 @@ it('axe finds nothing in them in light, dark and forced colours', async () => {
     const { width, height } = partOf(element, name)!.getBoundingClientRect();
     assert(width >= 24 && height >= 24, `${name} is ${width} x ${height}`);
   }
-});
 
-it('the keyboard reaches each, moves a slider, and is in the scene again after the button that goes', async () => {
-  const { element, child } = await showAll();
   element.focus();
   const reached: string[] = [];
   let slider: HTMLInputElement | null = null;
