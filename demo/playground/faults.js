@@ -1,11 +1,14 @@
 /** What the element would say of a value, beside the field that has it. */
 import { ATTRIBUTES } from '../../packages/element/dist/attributes.js';
+import { SCENE_ATTRIBUTES } from '../../packages/element/dist/composition/attributes.js';
+
+const ALL = { ...SCENE_ATTRIBUTES, ...ATTRIBUTES };
 
 const propertyOf = (name) => name.replace(/-(.)/g, (_, letter) => letter.toUpperCase());
 
 /** @returns {string} a sentence, empty for a value that the element takes. */
 export function faultOf(name, value) {
-  const { grammar } = ATTRIBUTES[propertyOf(name)] ?? {};
+  const { grammar } = ALL[propertyOf(name)] ?? {};
   if (grammar === undefined || typeof value !== 'string' || value === '' || grammar.parse(value) !== null) return '';
   return `Not used: expected ${grammar.expected}, found "${value}".`;
 }

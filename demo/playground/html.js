@@ -18,14 +18,30 @@ export function frameOf(cdn, attributes) {
   return `<iframe src="${escape(address)}" title="${escape(title)}" style="width: 100%; aspect-ratio: 4 / 3; border: 0" allow="fullscreen"></iframe>`;
 }
 
+/** What a cropped scene has on a tag of its own: the box belongs to it, and not to the element. */
+const OF_SCENE = ['src', 'up', 'crop', 'contract', 'chain', 'pose'];
+
+/**
+ * Which tag has which attributes.
+ * @param attributes {readonly (readonly [name: string, value: string | true])[]} true for an attribute without a value.
+ * @returns of the element, and of its `<splat-scene>`; null where it has none.
+ */
+export function tagsOf(attributes) {
+  if (!attributes.some(([name]) => name === 'crop')) return { element: attributes, scene: null };
+  const isOfScene = ([name]) => OF_SCENE.includes(name);
+  return { element: attributes.filter((each) => !isOfScene(each)), scene: attributes.filter(isOfScene) };
+}
+
 /**
  * The tag of a scene, with its size.
  * @param attributes {readonly (readonly [name: string, value: string | true])[]} true for an attribute without a value.
  * @param children {readonly string[]} HTML of labels and views
  */
 export function sceneOf(attributes, children) {
-  const content = children.map((child) => `\n  ${child}`).join('');
-  return `<gaussian-splat\n  ${partsOf([...attributes, ['style', STYLE]]).join('\n  ')}\n>${content}${content && '\n'}</gaussian-splat>`;
+  const { element, scene } = tagsOf(attributes);
+  const own = scene ? [`<splat-scene ${partsOf(scene).join(' ')}></splat-scene>`] : [];
+  const content = [...own, ...children].map((child) => `\n  ${child}`).join('');
+  return `<gaussian-splat\n  ${partsOf([...element, ['style', STYLE]]).join('\n  ')}\n>${content}${content && '\n'}</gaussian-splat>`;
 }
 
 /** A label or a view. */

@@ -23,8 +23,9 @@ export function uprightOf([a, b, c], eye) {
   return normal.map((value) => (side * value) / length);
 }
 
-/** What is up now: as the attribute says, or else the file. */
-const upNow = (scene) => parseUp(scene.getAttribute('up') ?? '') ?? scene.stats?.up ?? AS_TRAINED;
+/** What is up now: as the attribute says, which a cropped scene has on its own tag, or else the file. */
+export const upNow = (scene) =>
+  parseUp((scene.querySelector('splat-scene') ?? scene).getAttribute('up') ?? '') ?? scene.stats?.up ?? AS_TRAINED;
 
 /** A value for `up` that turns a scene on its head. */
 export function turnedOver(scene) {

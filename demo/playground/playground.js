@@ -3,8 +3,9 @@ import { copy } from '../site/copy.js';
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { viewOf } from '../site/view.js';
 import { Children } from './children.js';
+import { Crop } from './crop.js';
 import { faultOf, showFault } from './faults.js';
-import { frameOf, pageOf, sceneOf, scriptOf } from './html.js';
+import { frameOf, pageOf, sceneOf, scriptOf, tagsOf } from './html.js';
 import { askForLevel, turnedOver } from './level.js';
 import { pickPoint } from './pick.js';
 import { alignSliders, connectSliders } from './sliders.js';
@@ -19,7 +20,7 @@ const LISTS = ['chain', 'postprocess'];
 /** The element's build, which this site has, too. */
 const CDN = new URL('../cdn/', document.baseURI).href;
 /** What is fetched as soon as it changes. */
-const LOADED = ['src', 'views', ...ADDRESSES, ...LISTS];
+const LOADED = ['src', 'crop', 'views', ...ADDRESSES, ...LISTS];
 const VIEW = ['camera-orbit', 'camera-target', 'field-of-view'];
 
 /** The file that was dropped, while its name stands in the field of the source. */
@@ -27,6 +28,7 @@ let local = { name: '', address: '' };
 /** The name of the poster that was saved. */
 let savedPoster = '';
 const children = new Children(scene, byId('children'), show);
+const crop = new Crop(scene, form.elements.crop, form.querySelectorAll('[data-side]'), show);
 
 /** What the fields say: `[name, value]`, true for a bare attribute. Empty fields, and values that the element would not take, set nothing; `alt` and `src` come first. */
 function chosen() {
@@ -43,23 +45,64 @@ const rankOf = (name) => (FIRST.includes(name) ? FIRST.indexOf(name) : FIRST.len
 function show() {
   const attributes = chosen();
   for (const field of form.elements) {
-    const { name } = field;
-    if (!name) continue;
-    if (field.type !== 'checkbox') showFault(field, faultOf(name, field.value.trim()));
-    const [, value] = attributes.find(([each]) => each === name) ?? [];
-    setAttribute(name, name === 'src' && value === local.name ? local.address : value);
+    const { name, type, value } = field;
+    if (name && type !== 'checkbox') showFault(field, faultOf(name, value.trim()));
   }
+  setTags(tagsOf(attributes));
   alignSliders(form);
+  crop.align();
   byId('html').textContent = `${scriptOf(CDN)}\n${sceneHtml(attributes)}`;
   byId('copied').textContent = '';
   remember(attributes);
 }
 
-function setAttribute(name, value) {
+/** The tag of a scene that is cropped. */
+const cropped = document.createElement('splat-scene');
+
+/** A scene that changes its tag is loaded again. It leaves the one before it comes to the other, so that its memory is not taken twice. */
+function setTags(tags) {
+  const isCropped = tags.scene !== null;
+  if (isCropped !== cropped.isConnected) kept = turnedTo();
+  if (!isCropped) cropped.remove();
+  setAttributes(scene, tags.element);
+  setAttributes(cropped, tags.scene ?? []);
+  if (isCropped && !cropped.isConnected) scene.append(cropped);
+}
+
+/** Whether a visitor has moved the camera since the fields last said where it is. */
+let isTurned = false;
+/** The view that comes back once the scene is loaded again. */
+let kept;
+
+/** Where a visitor has moved the camera, as `flyTo()` takes it. */
+function turnedTo() {
+  if (!isTurned) return undefined;
+  const [orbit, target, fieldOfView] = [scene.getCameraOrbit(), scene.getCameraTarget(), scene.getFieldOfView()];
+  return { orbit: String(orbit), target: String(target), fieldOfView: String(fieldOfView) };
+}
+
+/** Frames what is left of the scene, as a page with this HTML would; a visitor's view stays. */
+async function frameAgain() {
+  const view = turnedTo();
+  await scene.updateFraming();
+  if (view) await scene.flyTo(view, { duration: 0 });
+}
+
+/** Sets what is given, and removes every other attribute that the form has a field for. */
+function setAttributes(element, attributes) {
+  const values = new Map(attributes);
+  for (const { name } of form.elements) {
+    if (!name) continue;
+    const value = values.get(name);
+    setAttribute(element, name, name === 'src' && value === local.name ? local.address : value);
+  }
+}
+
+function setAttribute(element, name, value) {
   const wanted = value === true ? '' : (value ?? null);
-  if (wanted === scene.getAttribute(name)) return;
-  if (wanted === null) scene.removeAttribute(name);
-  else scene.setAttribute(name, wanted);
+  if (wanted === element.getAttribute(name)) return;
+  if (wanted === null) element.removeAttribute(name);
+  else element.setAttribute(name, wanted);
 }
 
 /** The tag to paste, with labels, views, and the poster that was saved. */
@@ -116,6 +159,7 @@ async function copyUnlessLocal(textOf) {
 /** The other way up: files such as SPZ do not say which, and tools do not agree. */
 function flip() {
   asking.abort();
+  isTurned = false;
   for (const name of VIEW) form.elements[name].value = '';
   form.elements.up.value = turnedOver(scene);
   show();
@@ -130,6 +174,7 @@ async function level() {
   const say = (sentence) => (byId('copied').textContent = sentence);
   try {
     const up = await askForLevel(scene, say, asking.signal);
+    isTurned = false;
     for (const name of VIEW) form.elements[name].value = '';
     form.elements.up.value = up;
     show();
@@ -190,14 +235,33 @@ scene.addEventListener('load', () => {
   const { splats, bytes } = scene.statistics;
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
   for (const button of document.querySelectorAll('.result button')) button.disabled = false;
+  crop.measure();
+  if (kept) scene.flyTo(kept, { duration: 0 });
+  kept = undefined;
 });
-scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
+scene.addEventListener('loadstart', () => {
+  byId('status').textContent = 'Loading';
+  crop.forget();
+});
+scene.addEventListener('camera-change', ({ detail }) => (isTurned ||= detail.source === 'user-interaction'));
 for (const type of ['error', 'generator-error']) {
-  scene.addEventListener(type, ({ detail }) => (byId('status').textContent = detail.message));
+  scene.addEventListener(type, ({ detail }) => {
+    byId('status').textContent = detail.message;
+    kept = undefined;
+  });
 }
-form.addEventListener('change', show);
+// A box belongs to the scene that it was made for.
+form.elements.src.addEventListener('change', () => {
+  form.elements.crop.value = '';
+  isTurned = false;
+});
+form.addEventListener('change', ({ target }) => {
+  if (VIEW.includes(target.name ?? '')) isTurned = false;
+  show();
+  if (target.name === 'crop' || target.dataset.side) void frameAgain();
+});
 form.addEventListener('input', ({ target }) => {
-  // An address is no address before it is complete.
+  // An address is no address before it is complete, and a box that is no box would load the scene again.
   if (target.type !== 'range' && !LOADED.includes(target.name)) show();
 });
 connectSliders(form, show);
@@ -221,6 +285,7 @@ byId('copy').addEventListener('click', async () => {
 byId('reset').addEventListener('click', () => {
   asking.abort();
   form.reset();
+  isTurned = false;
   children.clear();
   savedPoster = '';
   show();
@@ -230,7 +295,8 @@ takeFiles(document.documentElement, (file) => {
   local = { name: file.name, address: addressOf(file) };
   form.elements.src.value = file.name;
   form.elements.alt.value = '';
-  for (const name of VIEW) form.elements[name].value = '';
+  for (const name of [...VIEW, 'crop']) form.elements[name].value = '';
+  isTurned = false;
   children.clear();
   savedPoster = '';
   show();

@@ -6,7 +6,7 @@
  */
 export function connectSliders(form, onChange) {
   form.addEventListener('input', ({ target }) => {
-    if (target.type !== 'range') return;
+    if (target.dataset.of === undefined) return;
     const field = form.elements[target.dataset.of];
     field.value = partsOf(form, field)
       .map((part, i) => (i === Number(target.dataset.part) ? `${target.value}${target.dataset.unit}` : part))
@@ -26,7 +26,7 @@ export function alignSliders(form) {
 }
 
 const slidersOf = (form, name) =>
-  [...form.querySelectorAll('input[type=range]')].filter(({ dataset }) => name === undefined || dataset.of === name);
+  [...form.querySelectorAll('input[data-of]')].filter(({ dataset }) => name === undefined || dataset.of === name);
 
 /** The parts of a field's text, those that it leaves out as their sliders begin. */
 function partsOf(form, field) {

@@ -66,6 +66,7 @@ export default function configure(eleventy) {
   eleventy.addFilter('source', (path) => readFileSync(join(root, path), 'utf8'));
   eleventy.addFilter('codes', codes);
   eleventy.addFilter('selectByName', (items, wanted) => items.find(({ name }) => name === wanted));
+  eleventy.addFilter('selectByTag', (items, wanted) => items.find(({ tag }) => tag === wanted));
   // Pages are linked relatively: the site may lie in any folder of any host.
   eleventy.addFilter('from', (target, url) => relativeAddress(url, target));
   eleventy.on('eleventy.after', ({ results }) => writePageList(results));

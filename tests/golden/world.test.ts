@@ -461,10 +461,11 @@ test('the bounds of a world hold what is visible of it', () => {
   );
   for (const { at, reach } of [
     { at: 5, reach: 2 },
-    { at: 0, reach: 1 },
+    { at: 0.5, reach: 1 },
   ])
     assert.ok(Math.abs(center[0] - at) + reach <= radius + 1e-9, 'both balls are held');
   one.visible = false;
+  assert.deepEqual(boundsOfWorld(world)!.center, [0.5, 0, 0], 'the middle of what a crop leaves');
   other.crop = undefined;
   assert.deepEqual(boundsOfWorld(world), bounds);
 });

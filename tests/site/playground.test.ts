@@ -234,5 +234,73 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.deepEqual(faults, []);
   });
 
+  it('crops a scene by the sides of a box, in the HTML, the link and the frame too', { timeout: 120_000 }, async () => {
+    const { tab, faults } = visit;
+    await tab.click('#reset');
+    await tab.setInputFiles('#drop input', { name: 'floor.splat', mimeType: '', buffer: floorOf([0, -1, 0]) });
+    /** Waits until the box around what is left is this one. */
+    const boxIs = (wanted: number[]): Promise<unknown> =>
+      tab.waitForFunction(
+        (sides) => {
+          const box = document.querySelector('gaussian-splat')!.getBoundingBox();
+          const found = box && [box.min.x, box.max.x, box.min.z, box.max.z];
+          return found?.every((value, i) => Math.abs(value - sides[i]) < 0.2);
+        },
+        wanted,
+        PATIENCE,
+      );
+    await boxIs([-2, 2, -2, 2]);
+    await tab.locator('summary', { hasText: 'Crop' }).click();
+    await tab.waitForFunction(() => !document.querySelector<HTMLInputElement>('[data-side=right]')!.disabled);
+    await tab.evaluate(() => document.querySelector<HTMLElement>('gaussian-splat')!.focus());
+    await tab.keyboard.press('ArrowRight');
+    const [turned] = (await stateOf(tab)).view;
+    await tab.locator('[data-side=right]').fill('25');
+    await boxIs([-2, -1, -2, 2]);
+    await tab.waitForFunction(
+      (wanted) => String(document.querySelector<Splat>('gaussian-splat')!.getCameraOrbit()) === wanted,
+      turned,
+      PATIENCE,
+    );
+    // A side at the end of its slider is far out: nothing of a sky goes.
+    assert.ok(Number((await tab.inputValue('#attribute-crop')).split(' ')[0]) < -100);
+    // Towards the camera: z of viewer space, and -z of the file.
+    await tab.locator('[data-side=front]').fill('50');
+    await boxIs([-2, -1, -2, 0]);
+    const text = await tab.inputValue('#attribute-crop');
+    const tag = `<splat-scene src="floor.splat" crop="${text}"></splat-scene>`;
+    assert.ok((await tab.locator('#html').textContent())!.includes(tag), tag);
+    // Upside down the same splats are left, and other sliders stand for them.
+    await tab.click('#flip');
+    await boxIs([-2, -1, 0, 2]);
+    assert.equal(await tab.inputValue('#attribute-crop'), text);
+    assert.equal(await tab.locator('splat-scene').getAttribute('up'), 'y');
+    await tab.fill('#attribute-crop', '1 1 1 0 0 0');
+    await tab.locator('#attribute-crop').blur();
+    assert.match((await tab.locator('#attribute-crop-fault').textContent())!, /the least first/);
+    await tab.fill('#attribute-crop', '');
+    await tab.locator('#attribute-crop').blur();
+    await boxIs([-2, 2, -2, 2]);
+    assert.equal(await tab.locator('splat-scene').count(), 0);
+
+    await tab.click('#reset');
+    await tab.fill('#attribute-src', COMPASS);
+    await tab.locator('#attribute-src').blur();
+    await tab.fill('#attribute-crop', '0 -9 -9 9 9 9');
+    await tab.locator('#attribute-crop').blur();
+    await tab.waitForFunction(() => document.querySelector('splat-scene'));
+    const { pathname, search } = new URL(tab.url());
+    const { tab: other, faults: others } = await open.visit(pathname + search, {
+      width: 240,
+      height: 400,
+      prepare: withCompass,
+    });
+    await loaded(other);
+    const least = await other.evaluate(() => document.querySelector('gaussian-splat')!.getBoundingBox()!.min.x);
+    assert.ok(Math.abs(least) < 1e-6, `by the link the least x is ${least}`);
+    await other.close();
+    assert.deepEqual([faults, others], [[], []]);
+  });
+
   it('is a page as every other', () => checkPage(visit));
 });

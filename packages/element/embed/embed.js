@@ -6,6 +6,9 @@ const ADDRESSES = ['src', 'poster'];
 /** Attributes that name further models, or send cookies to other servers: a link that somebody else has written sets none of these. */
 const REFUSED = ['contract', 'chain', 'postprocess', 'crossorigin'];
 
+/** What a `<splat-scene>` has in the element's place. */
+const OF_SCENE = ['src', 'up', 'crop', 'pose'];
+
 const query = new URLSearchParams(location.search);
 const origins = document.querySelector('meta[name=allowed-origins]').content.split(/\s+/).filter(Boolean);
 
@@ -27,12 +30,29 @@ function show() {
   if (!query.has('src')) throw new Error('src: expected the address of a scene, as in embed.html?src=garden.spz');
   const scene = document.createElement('gaussian-splat');
   scene.setAttribute('camera-controls', '');
+  // A box belongs to a scene, which then has a tag of its own.
+  const holder = query.has('crop') ? scene.appendChild(document.createElement('splat-scene')) : scene;
   for (const [name, value] of query) {
-    if (!GaussianSplatElement.observedAttributes.includes(name) || REFUSED.includes(name)) continue;
+    const isOfScene = OF_SCENE.includes(name);
+    const isKnown = isOfScene || GaussianSplatElement.observedAttributes.includes(name);
+    if (!isKnown || REFUSED.includes(name)) continue;
     if (name === 'camera-controls' && value === 'false') scene.removeAttribute(name);
-    else scene.setAttribute(name, ADDRESSES.includes(name) ? allowed(name) : value);
+    else (isOfScene ? holder : scene).setAttribute(name, ADDRESSES.includes(name) ? allowed(name) : value);
   }
-  document.body.append(scene);
+  document.title = query.get('alt') || document.title;
+  document.querySelector('main').append(scene);
+  offerFullScreen(document.querySelector('button'));
+}
+
+/** A frame shows no button of the page around it. The whole page gets large, so that its button, which also ends it, stays in sight. */
+function offerFullScreen(button) {
+  button.hidden = !document.fullscreenEnabled;
+  button.addEventListener('click', () =>
+    document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen(),
+  );
+  document.addEventListener('fullscreenchange', () => {
+    button.ariaLabel = document.fullscreenElement ? 'Leave full screen' : 'Full screen';
+  });
 }
 
 try {
@@ -40,5 +60,5 @@ try {
 } catch (error) {
   const sentence = document.createElement('p');
   sentence.textContent = error.message;
-  document.body.append(sentence);
+  document.querySelector('main').append(sentence);
 }

@@ -43,7 +43,14 @@ function cut(bounds: Bounds, crop: Box): Bounds {
   const [min, max] = [clamp(bounds.min), clamp(bounds.max)];
   const reach = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2;
   const { center, radius } = bounds;
-  return { min, max, center: clamp(center), radius: Math.min(radius, reach) || radius };
+  // The middle of what is left of the ball, so that what is left is framed.
+  const middle = (axis: number): number => {
+    if (min[axis] === bounds.min[axis] && max[axis] === bounds.max[axis]) return center[axis];
+    const from = Math.max(min[axis], Math.min(max[axis], center[axis] - radius));
+    const to = Math.max(min[axis], Math.min(max[axis], center[axis] + radius));
+    return (from + to) / 2;
+  };
+  return { min, max, center: [middle(0), middle(1), middle(2)], radius: Math.min(radius, reach) || radius };
 }
 
 /** Bounds of two scenes together. */

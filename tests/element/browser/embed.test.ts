@@ -1,12 +1,15 @@
 /** The page for iframes: what its address may ask for. */
+import { emulateMedia } from '@web/test-runner-commands';
+import { violations } from './support/axe.js';
 import { assert, assertEqual, COMPASS, nextEvent, until } from './support/harness.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
 }
 
-async function open(query: string): Promise<Document> {
+async function open(query: string, allow = ''): Promise<Document> {
   const frame = document.createElement('iframe');
+  frame.allow = allow;
   frame.src = `/packages/element/cdn/embed.html?${query}`;
   frame.style.cssText = 'width: 300px; height: 200px';
   const loaded = nextEvent(frame, 'load');
@@ -35,6 +38,39 @@ describe('embed.html', () => {
       'attributes',
     );
     await until(() => scene.loaded, 'the scene', 30_000);
+  });
+
+  it('has a button for the full screen where its frame allows that, and nothing that axe finds', async () => {
+    const query = String(new URLSearchParams({ src: COMPASS, alt: 'A compass' }));
+    const page = await open(query, 'fullscreen');
+    await until(() => page.querySelector<Splat>('gaussian-splat')!.loaded, 'the scene', 30_000);
+    const button = page.querySelector('button')!;
+    assertEqual([button.hidden, button.ariaLabel, page.title], [false, 'Full screen', 'A compass']);
+    const { width, height } = button.getBoundingClientRect();
+    assert(width >= 24 && height >= 24, `${width} x ${height}`);
+    for (const look of [{ colorScheme: 'dark' }, { colorScheme: 'light', forcedColors: 'active' }] as const) {
+      await emulateMedia(look);
+      // The heading is that of the page around the frame.
+      const options = { rules: { 'page-has-heading-one': { enabled: false } } };
+      assertEqual(await violations(page, options), [], JSON.stringify(look));
+    }
+    await emulateMedia({ forcedColors: 'none', colorScheme: 'light' });
+  });
+
+  it('crops: the scene then has a tag of its own', async () => {
+    const page = await open(
+      String(new URLSearchParams({ src: COMPASS, up: '-y', crop: '0 -9 -9 9 9 9' })),
+      "fullscreen 'none'",
+    );
+    const scene = page.querySelector<Splat & { getBoundingBox(): { min: { x: number } } }>('gaussian-splat')!;
+    const child = scene.querySelector('splat-scene')!;
+    assertEqual([scene.hasAttribute('src'), child.getAttribute('up')], [false, '-y'], 'attributes');
+    assertEqual(page.querySelector('button')!.hidden, true, 'no button where its frame refuses the full screen');
+    await until(() => scene.loaded, 'the scene', 30_000);
+    const { x } = scene.getBoundingBox().min;
+    assert(Math.abs(x) < 1e-6, `the least x is ${x}`);
+    const refused = await open(String(new URLSearchParams({ src: 'data:,', crop: '0 0 0 1 1 1' })));
+    assert(refused.querySelector('gaussian-splat') === null, 'a crop opens no other way to files');
   });
 
   it('refuses files of other servers and all other schemes, with a sentence', async () => {

@@ -312,6 +312,54 @@ describe('drags', () => {
   });
 });
 
+describe('a carousel that listens to pointers', () => {
+  /** As such code is written: it slides by what a pointer moves, unless somebody else has used the move. */
+  async function carouselAround(element: GaussianSplatElement): Promise<() => number> {
+    const slides = document.createElement('div');
+    slides.style.cssText = 'width: 600px; padding: 40px 0; touch-action: pan-y';
+    element.replaceWith(slides);
+    slides.append(element);
+    let [last, slid] = [NaN, 0];
+    slides.addEventListener('pointerdown', ({ clientX }) => (last = clientX));
+    slides.addEventListener('pointermove', (event) => {
+      if (Number.isNaN(last) || event.defaultPrevented) return;
+      slid += event.clientX - last;
+      last = event.clientX;
+    });
+    slides.addEventListener('pointerup', () => (last = NaN));
+    await frames(2);
+    return () => slid;
+  }
+
+  it('slides by drags beside the scene, and by none that turns it', async () => {
+    const element = await scene({ 'camera-orbit': '0deg 90deg 8m' });
+    const slid = await carouselAround(element);
+    await drag([100, 100], [60, 100]);
+    assert(Math.abs(theta(element) - 90) < 1e-6, `theta ${theta(element)}`);
+    assertEqual(slid(), 0, 'by a drag that turns');
+    await drag([400, 100], [360, 100]);
+    assertEqual([Math.round(theta(element)), slid()], [90, -40], 'theta, and slid beside the scene');
+  });
+
+  it('slides by what the page keeps for itself: pans with disable-pan', async () => {
+    const element = await scene({ 'camera-orbit': '0deg 90deg 8m', 'disable-pan': '' });
+    const slid = await carouselAround(element);
+    await drag([100, 100], [60, 100], 'right');
+    assertEqual([theta(element), slid()], [0, -40]);
+  });
+
+  it('does not slide by two fingers, nor by one that turns the scene', async () => {
+    const element = await scene({ 'camera-orbit': '0deg 90deg 8m', 'touch-action': 'none' });
+    const slid = await carouselAround(element);
+    await swipe([[[80, 100], [50, 100]], [[120, 100], [150, 100]]]); // prettier-ignore
+    assert(element.getCameraOrbit().radius < 8, 'the pinch');
+    await swipe([[[100, 100], [60, 100]]]); // prettier-ignore
+    assert(theta(element) > 50, `theta ${theta(element)}`);
+    // The first pixels of a finger do not say yet whose it is.
+    assert(Math.abs(slid()) <= 14, `slid by ${slid()}`);
+  });
+});
+
 describe('small and certain', () => {
   it('a point outside of the frame is not visible', async () => {
     const element = await scene({ 'camera-orbit': '0deg 90deg 8m' });
