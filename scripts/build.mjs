@@ -8,7 +8,7 @@ import { join } from 'node:path';
 import { writeAttributeRows } from '../packages/element/scripts/attributes.mjs';
 import { writeIntegrity } from '../packages/element/scripts/integrity.mjs';
 import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
-import { must, mustSoon, root } from './lib/run.mjs';
+import { must, mustSoon, root, TSC } from './lib/run.mjs';
 
 /** Scripts of pages, each beside its page. */
 const SCRIPTS = [
@@ -30,7 +30,7 @@ const extent = ['element', 'packages'].find((name) => process.argv.includes(`--$
 
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
-must(process.execPath, ['node_modules/typescript/bin/tsc', '--build', ...projects()]);
+must(process.execPath, [TSC, '--build', ...projects()]);
 writeLicences();
 if (extent !== 'element') await bundleThreads();
 if (extent !== 'packages') {

@@ -1,13 +1,13 @@
 /** Runs test files of Node and of Chromium beside each other, and counts. */
 import { relative } from 'node:path';
 import { runAsync } from './processes.mjs';
-import { root } from './run.mjs';
+import { root, TSC } from './run.mjs';
 import { byGroup, byProcess } from './test-files.mjs';
 
 /** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
 const MOST_UNSTEADY = 3;
 const IN_ONE_PROCESS = 'tests/support/in-one-process.ts';
-const TSC = ['node_modules/typescript/bin/tsc', '--noEmit', '--project', 'tests'];
+const TYPES = [TSC, '--noEmit', '--project', 'tests'];
 const ESLINT = ['node_modules/eslint/bin/eslint.js', '.'];
 const WORDS = ['scripts/words.mjs'];
 
@@ -75,7 +75,7 @@ async function runNode(files, concurrency, options, count) {
 /** Types of the tests and the style of everything: one failure each, if any. */
 async function runStatic(options) {
   const counts = [];
-  for (const args of [TSC, ESLINT, WORDS]) {
+  for (const args of [TYPES, ESLINT, WORDS]) {
     const { status } = await runAsync(process.execPath, args, options);
     counts.push(status === 0 ? NONE : { ...NONE, failed: 1, failures: [`Failed: ${args.join(' ')}`] });
   }

@@ -4,6 +4,9 @@ import { fileURLToPath } from 'node:url';
 
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 
+/** TypeScript's native compiler. ESLint, and tests that look into programs, need the interface of the one before. */
+export const TSC = 'node_modules/typescript-7/bin/tsc';
+
 /** Runs a command, in the project's root unless told otherwise, and returns its exit status. */
 export function run(command, args, { env = {}, stdio = 'inherit', cwd = root } = {}) {
   const result = spawnSync(command, args, { cwd, stdio, env: { ...process.env, ...env } });
