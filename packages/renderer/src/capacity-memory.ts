@@ -16,7 +16,7 @@ const PATIENCE_GROWTH = 4;
 const SAME_VIEW_MS = 1_000;
 /** With the pixels of a picture to such powers its need grows, where it was not seen: of levels of detail more splats, and pairs (0.1 from afar, 0.6 close up). */
 const EXPONENTS: Capacity = { visible: 0.25, pairs: 0.5 };
-/** By the levers of motion alone, more than the share of pixels says. */
+/** By the settings of motion alone, more than the share of pixels says. */
 const MOST_OF_MOTION = 2;
 
 const NOTHING: Capacity = { visible: 0, pairs: 0 };

@@ -60,7 +60,7 @@ export interface RenderSettings {
 /** The threshold of the trainers: INRIA's, gsplat's. */
 export const TRAINED_TRANSMITTANCE = 1e-4;
 
-/** The levers that leave nothing out: what scenes were trained with. */
+/** The settings that leave nothing out: what scenes were trained with. */
 const EXACT: RenderSettings = {
   rasterizer: 'auto',
   threads: 'auto',
@@ -120,7 +120,7 @@ const RANGES: Readonly<Partial<Record<keyof RenderSettings, readonly [least: num
   resolutionScale: [1 / 64, 1],
 };
 
-/** The values of levers that are no range. */
+/** The values of settings that are no range. */
 const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>>> = {
   rasterizer: ['auto', 'quads', 'tiles'],
   threads: ['auto', 'parallel', 'serial'],
@@ -132,8 +132,8 @@ const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>
 };
 
 /**
- * The levers of a quality, with those that differ from it.
- * @throws GaussianSplatError `argument/value` for a number out of range, a name that its lever does not know or an unknown quality.
+ * The settings of a quality, with those that differ from it.
+ * @throws GaussianSplatError `argument/value` for a number out of range, a name that its setting does not know or an unknown quality.
  */
 export function leversOf(options: Partial<RenderSettings> & { readonly quality?: Quality }): RenderSettings {
   const quality = options.quality ?? 'default';
@@ -150,7 +150,7 @@ export function leversOf(options: Partial<RenderSettings> & { readonly quality?:
   return levers;
 }
 
-/** @throws GaussianSplatError `argument/value` for a value that is not in its lever's range or none of its choices. */
+/** @throws GaussianSplatError `argument/value` for a value that is not in the range of its setting or none of its choices. */
 export function requireInRange(name: keyof RenderSettings, found: unknown, where = 'FrameSettings'): void {
   const choices = CHOICES[name];
   if (choices && !choices.includes(found)) throw invalid(name, choices.join(', '), found, where);

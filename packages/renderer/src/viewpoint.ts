@@ -437,7 +437,7 @@ export class Viewpoint {
     return made;
   }
 
-  /** What frames of these levers are drawn with: made anew where they ask for another rasterizer. */
+  /** What frames of these settings are drawn with: made anew where they ask for another rasterizer. */
   #useEngine(levers: RenderSettings & Variants): Engine {
     const { levers: own } = this.#engine;
     const isOwn =
@@ -483,7 +483,7 @@ export class Viewpoint {
     return { view, texture: target, format: target.format, isStorable, width, height };
   }
 
-  /** As large as frames of this target are without levers of their own: one with fewer pixels paints a part of it. */
+  /** As large as frames of this target are without settings of their own: one with fewer pixels paints a part of it. */
   #accumulationOf(drawn: Camera, target: Target): Accumulation {
     const share = this.resolvedSettings.resolutionScale;
     const width = Math.max(drawn.width, Math.round(target.width * share));

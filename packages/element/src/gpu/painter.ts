@@ -75,7 +75,7 @@ export interface Painter {
   readonly byteLength: number;
   readonly isDestroyed: boolean;
   readonly isLost: boolean;
-  /** True if there is what frames with other levers need. */
+  /** True if there is what frames with other settings need. */
   readonly isPrepared: boolean;
   /** What stands between the renderer and the canvas; undefined for frames as they are drawn. */
   readonly filter: FrameFilter | undefined;
@@ -83,7 +83,7 @@ export interface Painter {
   setFilter(filter: FrameFilter | undefined): void;
   /** Draws the frames to come like this. */
   setRendering(rendering: Rendering): void;
-  /** Makes what frames with other levers need, so that none of them has to. */
+  /** Makes what frames with other settings need, so that none of them has to. */
   prepare(levers: readonly Partial<PerFrameSettings>[]): void;
   /** The canvas's context, set up to be drawn into; null for a canvas of another kind. */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null;

@@ -81,7 +81,7 @@ export class Viewport implements Painter {
     this.#drawnSize = '';
   }
 
-  /** Settings of a frame; with levers of motion where there are some. */
+  /** Settings of a frame; with settings of motion where there are some. */
   #settings(levers?: Partial<PerFrameSettings>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { submissions } = this.#place;

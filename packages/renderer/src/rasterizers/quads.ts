@@ -66,7 +66,7 @@ export class QuadsRasterizer implements Rasterizer {
     this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
   }
 
-  /** One pipeline serves all levers. */
+  /** One pipeline serves all settings. */
   prepare(): void {
     this.#pipeline();
   }

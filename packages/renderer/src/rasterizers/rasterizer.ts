@@ -156,7 +156,7 @@ export interface Rasterizer {
   spareBytes(room: Room): number;
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
-  /** Makes the pipelines for other levers, so that no frame has to. @param format of the targets */
+  /** Makes the pipelines for other settings, so that no frame has to. @param format of the targets */
   prepare(levers: PaintingLevers, format: GPUTextureFormat, ordered?: OrderedPainting): void;
   /** Records what the parts of one frame have in common, before the first of them. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;

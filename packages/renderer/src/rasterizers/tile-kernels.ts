@@ -34,7 +34,7 @@ export interface RasterizeVariant {
   readonly format: GPUTextureFormat;
   readonly isFinal: boolean;
   readonly isNoting: boolean;
-  /** See `transmittanceMin` of the levers. */
+  /** See `transmittanceMin` of the settings. */
   readonly refusesLast: boolean;
 }
 

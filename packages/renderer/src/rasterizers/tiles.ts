@@ -77,7 +77,7 @@ export class TilesRasterizer implements Rasterizer {
   readonly #device: GPUDevice;
   readonly #accumulation: AccumulationFormat;
   readonly #memory: GpuMemory;
-  /** Their bind groups fit those of other levers. */
+  /** Their bind groups fit those of other settings. */
   readonly #kernels: ListingKernels;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
