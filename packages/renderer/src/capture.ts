@@ -1,7 +1,7 @@
 import { validateCamera, type Camera } from '@gaussian-splat/core';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import type { FrameRequest } from './frame-request.js';
-import type { FrameSettings, FrameTarget } from './picture.js';
+import type { FrameSettings, FrameTarget } from './frame-target.js';
 import type { Renderer } from './renderer.js';
 import { requireTextureSize } from './requirements.js';
 import type { Viewpoint } from './viewpoint.js';

@@ -1,7 +1,7 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { GaussianScene } from './gaussian-scene.js';
-import type { PerFrameSettings } from './levers.js';
-import type { FrameSettings, FrameTarget, Rgba } from './picture.js';
+import type { PerFrameSettings } from './render-settings.js';
+import type { FrameSettings, FrameTarget, Rgba } from './frame-target.js';
 
 /** Settings, and who is called when a frame lacked room: see {@link ViewpointOptions}. */
 export interface RendererOptions extends FrameSettings {

@@ -2,7 +2,7 @@ import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings, Stages } from './bindings.js';
 import type { PageRequests, WishLevers } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
-import type { RenderSettings } from './levers.js';
+import type { RenderSettings } from './render-settings.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { Scratch } from './scratch.js';
 

@@ -1,7 +1,7 @@
 import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
-import type { RenderSettings } from './levers.js';
+import type { RenderSettings } from './render-settings.js';
 import type { ShPrecision } from './pack/sh.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */

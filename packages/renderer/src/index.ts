@@ -10,7 +10,7 @@ export type { GaussianPage, GaussianScene, PageRequests } from './gaussian-scene
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
-export { QUALITIES, type PerFrameSettings, type RenderSettings, type Quality } from './levers.js';
+export { QUALITIES, type PerFrameSettings, type RenderSettings, type Quality } from './render-settings.js';
 export { LinearColours } from './linear-colours.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
 export { buildPackedLevels, type PackedLevels } from './detail/packed-levels.js';
@@ -56,7 +56,7 @@ export {
   type Rgba,
   type Target,
   type TargetView,
-} from './picture.js';
+} from './frame-target.js';
 export { Renderer } from './renderer.js';
 export { Viewpoint, type View, type ViewpointOptions } from './viewpoint.js';
 export { boundsOfWorld } from './world-bounds.js';

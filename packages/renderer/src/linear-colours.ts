@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { composeLinear } from './generated/linear-shaders.js';
 import { perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Resource } from './gpu/kernel.js';
-import type { Composer, Target } from './picture.js';
+import type { Composer, Target } from './frame-target.js';
 
 /**
  * Colours of a target that holds linear light, as of a host whose output pass encodes later, or of a `-srgb` format. Splats are blended in encoded colours, as

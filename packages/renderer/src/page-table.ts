@@ -4,7 +4,7 @@ import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import type { RenderSettings } from './levers.js';
+import type { RenderSettings } from './render-settings.js';
 import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
 import { cameraValues, MAX_FLOAT32 } from './view.js';

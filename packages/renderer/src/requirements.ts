@@ -1,8 +1,8 @@
 /** What a renderer asks of its device and of those who call it, and the errors that say so. */
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { FrameSettings, FrameTarget } from './picture.js';
+import type { FrameSettings, FrameTarget } from './frame-target.js';
 import { TEXTURE_USAGE } from './gpu/kernel.js';
-import type { RenderSettings } from './levers.js';
+import type { RenderSettings } from './render-settings.js';
 import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
 
 export function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {

@@ -1,5 +1,5 @@
 import { perDevice } from './gpu/kernel.js';
-import type { RenderSettings } from './levers.js';
+import type { RenderSettings } from './render-settings.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 import type { Threads } from './stages/plan.js';
 

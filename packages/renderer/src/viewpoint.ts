@@ -10,8 +10,8 @@ import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { orderOn } from './lazy-order.js';
-import { leversOf, type RenderSettings } from './levers.js';
-import type { FrameSettings, FrameTarget, Target } from './picture.js';
+import { renderSettingsOf, type RenderSettings } from './render-settings.js';
+import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { AuxiliaryFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
@@ -125,7 +125,7 @@ export class Viewpoint {
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
-    this.#engine = this.#makeEngine(this.#leversOf(settings));
+    this.#engine = this.#makeEngine(this.#renderSettingsOf(settings));
   }
 
   /** Settings of frames that are given none. */
@@ -137,14 +137,14 @@ export class Viewpoint {
     if (settings === this.#settings) return;
     this.#variants = variantsOf(this.#device);
     this.#known = new WeakMap();
-    const levers = this.#leversOf(settings);
+    const levers = this.#renderSettingsOf(settings);
     this.#settings = settings;
     this.#useEngine(levers);
   }
 
   /** The settings that {@link settings} come to on this device; nothing is left `auto`. */
   get resolvedSettings(): RenderSettings & Variants {
-    return this.#leversOf(this.#settings);
+    return this.#renderSettingsOf(this.#settings);
   }
 
   /** Name of the rasterizer in use. */
@@ -171,7 +171,7 @@ export class Viewpoint {
    */
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
     const { rasterizer } = this.#engine;
-    const all = settings.map((each) => this.#leversOf(each));
+    const all = settings.map((each) => this.#renderSettingsOf(each));
     for (const levers of all) {
       const order = levers.order === 'pixel' ? orderOn(this.#device).now : undefined;
       rasterizer.prepare(levers, targetFormat, order?.paintingOf(levers));
@@ -244,7 +244,7 @@ export class Viewpoint {
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
     const target = this.#targetOf(picture, camera);
-    const asked = this.#leversOf(settings);
+    const asked = this.#renderSettingsOf(settings);
     const order = this.#orderOf(asked);
     this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
@@ -429,10 +429,10 @@ export class Viewpoint {
     return current;
   }
 
-  #leversOf(settings: FrameSettings): RenderSettings & Variants {
+  #renderSettingsOf(settings: FrameSettings): RenderSettings & Variants {
     const known = this.#known.get(settings);
     if (known) return known;
-    const made = settle(this.#variants, leversOf(settings));
+    const made = settle(this.#variants, renderSettingsOf(settings));
     this.#known.set(settings, made);
     return made;
   }

@@ -5,7 +5,7 @@ import { constants } from '../generated/shaders.js';
 import { packKept, type PackedGaussians } from '../pack/pack.js';
 import type { ShPrecision } from '../pack/sh.js';
 import type { GaussianScene } from '../gaussian-scene.js';
-import type { FrameSettings } from '../picture.js';
+import type { FrameSettings } from '../frame-target.js';
 import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 

@@ -11,7 +11,7 @@ import {
   type ComputeKernel,
   type ShaderDescription,
 } from '../gpu/kernel.js';
-import type { RenderSettings } from '../levers.js';
+import type { RenderSettings } from '../render-settings.js';
 import type { Scratch } from '../scratch.js';
 import type { OrderedPainting, PaintingDepth } from './rasterizer.js';
 import { rasterizeKernel, type RasterizeKernel } from './tile-kernels.js';

@@ -1,7 +1,7 @@
 import type { FrameTimer } from '../gpu/pass-timer.js';
 import type { Camera } from '@gaussian-splat/core';
 import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
-import type { RenderSettings } from '../levers.js';
+import type { RenderSettings } from '../render-settings.js';
 import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */

@@ -4,7 +4,7 @@ import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
 import type { Threads } from '../stages/plan.js';
-import { TRAINED_TRANSMITTANCE } from '../levers.js';
+import { TRAINED_TRANSMITTANCE } from '../render-settings.js';
 import type {
   AccumulationFormat,
   AuxiliaryOutputs,

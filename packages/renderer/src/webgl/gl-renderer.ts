@@ -2,7 +2,7 @@ import { SPLAT_FILTERS, validateCamera, type Camera, type ShDegree, type SplatFi
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { constants, layouts } from '../generated/shaders.js';
 import { SH_PRECISION } from '../pack/sh.js';
-import type { Rgba } from '../picture.js';
+import type { Rgba } from '../frame-target.js';
 import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
 import { cameraValues, MAX_FLOAT32, scaled } from '../view.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';

@@ -135,7 +135,7 @@ const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>
  * The settings of a quality, with those that differ from it.
  * @throws GaussianSplatError `argument/value` for a number out of range, a name that its setting does not know or an unknown quality.
  */
-export function leversOf(options: Partial<RenderSettings> & { readonly quality?: Quality }): RenderSettings {
+export function renderSettingsOf(options: Partial<RenderSettings> & { readonly quality?: Quality }): RenderSettings {
   const quality = options.quality ?? 'default';
   if (!Object.hasOwn(QUALITIES, quality)) throw invalid('quality', Object.keys(QUALITIES).join(', '), quality);
   const base = QUALITIES[quality];

@@ -1,7 +1,7 @@
 import type { SplatFilter } from '@gaussian-splat/core';
 import type { FrameTimer } from './gpu/pass-timer.js';
-import type { RenderSettings, Quality } from './levers.js';
-import { leversOf } from './levers.js';
+import type { RenderSettings, Quality } from './render-settings.js';
+import { renderSettingsOf } from './render-settings.js';
 import type { Resource } from './gpu/kernel.js';
 import type { AuxiliaryOutputs, PaintingDepth, Surface } from './rasterizers/rasterizer.js';
 
@@ -73,4 +73,4 @@ export interface FrameSettings extends Partial<RenderSettings> {
  * @throws GaussianSplatError `argument/value` for an unknown quality or a value out of its range.
  */
 export const settings = (quality: Quality = 'default', changes: Partial<RenderSettings> = {}): FrameSettings =>
-  Object.freeze(leversOf({ ...changes, quality }));
+  Object.freeze(renderSettingsOf({ ...changes, quality }));
