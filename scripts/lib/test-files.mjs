@@ -17,6 +17,8 @@ const LABORATORY = [
   /^tests\/element\/browser\/(high-density|lives|loads-apart|media-chrome|pace|previews)/,
   // Every family and the examples; the mechanism is tested by session, proof, shapes and element.
   /^tests\/generator\/browser\/(examples\/|families|orbit|picture-pair|post-unreachable|provider|scenes)/,
+  // What `npm run release` makes.
+  /^tests\/packages\/release/,
   // Stages and WebGL are tested in Node and in the element; losses of the device in device.
   /^tests\/stages\/browser\//,
   /^tests\/stability\/browser\/(device-loss|gpu-crash|resize)/,

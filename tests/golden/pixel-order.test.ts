@@ -73,7 +73,7 @@ for (const mode of ['classic', 'antialiased'] as const) {
   });
 }
 
-test('rays that are all parallel', async () => {
+test('rays that are all parallel', { skip: onlyInLab }, async () => {
   const camera = { ...view, orthographic: true, fx: 30, fy: 30 };
   const [found] = await compare('crossing, parallel', crossing(14), camera, [NARROW]);
   assert.ok(found >= 59, `${found} dB`);
