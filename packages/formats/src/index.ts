@@ -35,5 +35,6 @@ export {
   type MovingPart,
 } from './motion.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
-export { HEADER_BYTES, readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
+export { MAX_HEADER_BYTES as HEADER_BYTES } from './ply/header-bytes.js';
+export { readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
 export { samplePreview } from './preview.js';

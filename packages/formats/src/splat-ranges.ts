@@ -13,14 +13,11 @@ export interface SplatRanges {
   readonly rows?: { readonly start: number; readonly byteLength: number };
 }
 
-/** Bytes of a PLY that its header does not exceed. */
-export const HEADER_BYTES = 1 << 18;
-
 /**
  * Tells whether some of a scene's splats can be read without the others, so that several threads can share the reading: of binary PLY whose rows have one size and float32
  * coordinates, and of uncompressed glTF.
  *
- * @param file the whole file; of a PLY {@link HEADER_BYTES} of its beginning are enough, and it is not checked that the rest is there.
+ * @param file the whole file; of a PLY `HEADER_BYTES` of its beginning are enough, and it is not checked that the rest is there.
  * @returns undefined if it must be read whole
  * @throws GaussianSplatError as `readScene` does for what is wrong with a header
  */

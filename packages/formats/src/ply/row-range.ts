@@ -2,7 +2,8 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { keptDegree } from '../cloud.js';
 import { readPly } from '../readers/ply.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
-import { HEADER_BYTES, type SplatRanges } from '../splat-ranges.js';
+import type { SplatRanges } from '../splat-ranges.js';
+import { MAX_HEADER_BYTES } from './header-bytes.js';
 import { findGaussians, withPlainNames } from './gaussian-layout.js';
 import { exceedsFloat32, parsePlyHeader } from './header.js';
 import { openElement } from './rows.js';
@@ -13,7 +14,7 @@ export function plyRanges(source: SceneSource): SplatRanges | undefined {
   const { vertex, degree } = findGaussians(source, header);
   const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
   const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && exceedsFloat32(type));
-  if (rowBytes === undefined || rowBytes === 0 || isCoarse || start > HEADER_BYTES) return undefined;
+  if (rowBytes === undefined || rowBytes === 0 || isCoarse || start > MAX_HEADER_BYTES) return undefined;
   return { count: vertex.count, shDegree: keptDegree(degree), rows: { start, byteLength: rowBytes } };
 }
 
