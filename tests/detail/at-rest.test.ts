@@ -149,12 +149,15 @@ test('pages that do not come are asked for again, though the view is at rest', a
   const [drawing, picture] = [await renderer(), await target()];
   const draw = (): void =>
     drawing.render({ gaussians: scene, camera: besides([0, 0, 0], 4, 1), target: picture, detail: 0.2 });
-  await live(750, draw);
+  for (let round = 0; round < 40 && errors.length === 0; round++) await live(25, draw);
   const { resident } = scene.progress;
   assert.ok(errors.length > 0 && scene.progress.error > 0.2);
   isDown = false;
-  await pause(4500);
-  await live(750, draw);
+  // Asked for again after four seconds; later, where a busy machine has seen a second failure.
+  for (let round = 0; round < 60 && scene.progress.error > 0; round++) {
+    await pause(500);
+    await live(50, draw);
+  }
   assert.ok(scene.progress.resident > resident && scene.progress.error === 0, JSON.stringify(scene.progress));
   [drawing, picture, scene].forEach((owner) => owner.destroy());
 });
