@@ -100,9 +100,6 @@ describe('the interaction prompt', () => {
 
   it('comes after a rest, costs no frame, and goes with the first touch', async () => {
     const element = await showLoaded(prompted);
-    // What follows a first frame, and is none of the prompt's, is over when nothing has been drawn for a while.
-    for (let seen = -1; seen !== submits; await delay(600)) seen = submits;
-    element.resetInteractionPrompt();
     const before = submits;
     await until(() => partOf(element, '[part=prompt]') !== null, 'the prompt');
     await delay(300);
