@@ -23,11 +23,12 @@ const LABORATORY = [
   /^tests\/stages\/browser\//,
   /^tests\/stability\/browser\/(device-loss|gpu-crash|resize)/,
 ];
-/** Tests in Chromium that look at what happens in time: no other page runs beside them. */
+/** Tests in Chromium that look at what happens in time, or have the server lose files: no other page runs beside them. */
 const TIMING = [
   'tests/element/browser/behaviours.test.ts',
   'tests/element/browser/input.test.ts',
   'tests/element/browser/lifecycle.test.ts',
+  'tests/element/browser/lost-code.test.ts',
   'tests/element/browser/meanwhile.test.ts',
   'tests/element/browser/pace.test.ts',
   'tests/element/browser/picking.test.ts',

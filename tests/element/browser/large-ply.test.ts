@@ -57,10 +57,11 @@ describe('a large PLY', () => {
     });
     const previews: number[] = [];
     const start = performance.now();
-    const limited = { ...request(`${FILE}&ms=2500`), limits: { maxSeconds: 60 } };
+    const limited = { ...request(`${FILE}&gate=previews`), limits: { maxSeconds: 240 } };
     const scene = await loader.load(limited, signal, ignore, ({ packed }) => {
       console.log(`preview of ${packed.count} after ${(performance.now() - start).toFixed(0)} ms`);
       previews.push(packed.count);
+      void fetch('/net/open/previews');
     });
     assert(spawned.length > 1, `${spawned.length} workers`);
     assert(previews.length > 0 && previews[0] < SPLATS, 'a preview');
@@ -75,9 +76,10 @@ describe('a large PLY', () => {
       return worker;
     });
     let isKilled = false;
-    const scene = await loader.load(request(`${FILE}&ms=2500`), signal, (loaded) => {
-      if (loaded < 20e6 || isKilled) return;
+    const scene = await loader.load(request(`${FILE}&gate=helpers`), signal, (loaded) => {
+      if (loaded < 20e6 || isKilled || spawned.length === 1) return;
       isKilled = true;
+      void fetch('/net/open/helpers');
       for (const helper of spawned.slice(1)) helper.terminate();
     });
     assert(isKilled && spawned.length > 1, 'helpers were there');

@@ -128,8 +128,6 @@ describe('a streamed SOG scene', () => {
       `first frame after ${shownMs.toFixed(0)} ms and ${bytes} bytes, ${((100 * bytes) / all).toFixed(2)} % of all`,
     );
     assert(bytes > 0 && bytes < 0.05 * all, `${bytes} bytes`);
-    // A second on an idle machine; two other pages share the processor that draws here.
-    assert(shownMs < 10_000, `${shownMs} ms`);
     await close(element);
   });
 

@@ -6,6 +6,7 @@ import { sendKeys, sendMouse } from '@web/test-runner-commands';
 import {
   assert,
   assertEqual,
+  atRest,
   COMPASS,
   delay,
   frames,
@@ -15,7 +16,7 @@ import {
   submits,
   until,
 } from './support/harness.js';
-import { isGreen, isRed, screenOf, sendTouch } from './support/screen.js';
+import { isGreen, isRed, screenOf, Taps } from './support/screen.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
 
@@ -121,34 +122,30 @@ describe('positionFromPoint', () => {
   it('a double tap picks it as well, once, and taps that are none do not', async () => {
     const element = await compass({ 'camera-controls': '', 'disable-tap': '' });
     const [x, y] = pageOf(element, [1, 0, 0]);
-    const tap = async (dx = 0): Promise<void> => {
-      await sendTouch('touchStart', [{ x: x + dx, y, id: 1 }]);
-      await sendTouch('touchEnd', []);
-    };
+    const taps = new Taps();
     let picks = 0;
     const { queries } = (element as unknown as { stage: { queries: { positionFromPoint: () => Promise<unknown> } } })
       .stage;
     const ask = queries.positionFromPoint.bind(queries);
     queries.positionFromPoint = (...place) => (picks++, ask(...place));
-    await tap();
-    await tap();
+    await taps.tap(x, y);
+    await taps.tap(x, y);
     await delay(400);
     near(element.getCameraTarget().x, 0, 1e-9, 'with disable-tap');
     element.disableTap = false;
     await element.updateComplete;
     for (const [pause, dx] of [
       [500, 0],
-      [0, 60],
+      [80, 60],
     ]) {
       picks = 0;
-      await tap();
-      await delay(pause);
-      await tap(dx);
+      await taps.tap(x, y, 500);
+      await taps.tap(x + dx, y, pause);
       await delay(500);
       assertEqual(picks, 0, `picks of taps ${pause} ms and ${dx} px apart`);
     }
-    await tap();
-    await tap();
+    await taps.tap(x, y, 500);
+    await taps.tap(x, y);
     await until(() => picks > 0, 'a pick');
     await delay(500);
     assertEqual(picks, 1, 'picks');
@@ -160,21 +157,19 @@ describe('hotspots', () => {
   it('stand at their points and move with the camera', async () => {
     const element = await compass();
     const button = label(element, 'red', '1m 0 0');
-    await frames(3);
     const middleOf = (): [number, number] => {
       const { left, top, width, height } = button.getBoundingClientRect();
       return [left + width / 2, top + height / 2];
     };
     const [x, y] = pageOf(element, [1, 0, 0]);
-    near(middleOf()[0], x, 0.6, 'x');
+    await until(() => Math.abs(middleOf()[0] - x) < 0.6, 'the label to be placed');
     near(middleOf()[1], y, 0.6, 'y');
     element.cameraOrbit = '90deg 90deg 8m';
     await nextEvent(element, 'camera-change');
     await frames();
     near(middleOf()[0], 100, 0.6, 'x from the right');
     button.dataset.position = '0m 1m 0m';
-    await frames(3);
-    assert(middleOf()[1] < 70, `the label of the top: ${middleOf().join()}`);
+    await until(() => middleOf()[1] < 70, 'the label to go to the top');
     const place = element.queryHotspot('hotspot-red');
     assertEqual([place?.position.y, place?.normal, element.queryHotspot('hotspot-none')], [1, null, null]);
   });
@@ -276,7 +271,7 @@ describe('hotspots', () => {
     const button = label(element, 'front', '0m 0m 1m');
     let clicks = 0;
     button.addEventListener('click', () => clicks++);
-    await delay(600);
+    await atRest(element, 600);
     const before = submits;
     await delay(600);
     assertEqual(submits - before, 0, 'submits');

@@ -4,7 +4,7 @@ import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
 import { randomSource } from '../../support/gpu.js';
 import { assert, assertEqual, delay, frames, hurry, showLoaded, until } from './support/harness.js';
-import { screenOf, sendTouch, turnWheel, type Rgb } from './support/screen.js';
+import { screenOf, sendTouch, Taps, turnWheel, type Rgb } from './support/screen.js';
 
 const STILL = { 'camera-controls': '', 'interaction-prompt': 'none', 'interpolation-decay': '0' };
 const [WIDTH, HEIGHT] = [200, 160];
@@ -51,10 +51,8 @@ async function swipe(fingers: readonly (readonly [from: readonly number[], to: r
 }
 
 async function doubleTap(x: number, y: number): Promise<void> {
-  for (let tap = 0; tap < 2; tap++) {
-    await sendTouch('touchStart', [{ x, y, id: 1 }]);
-    await sendTouch('touchEnd', []);
-  }
+  const taps = new Taps();
+  for (let k = 0; k < 2; k++) await taps.tap(x, y);
 }
 
 afterEach(async () => {

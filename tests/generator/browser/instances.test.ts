@@ -220,7 +220,7 @@ describe('instances of one generator', () => {
     await until(() => player.runs > 0, 'the first run');
     other.sink = new NumberSink(device);
     other.request(stateAt(3));
-    const isReady = await Promise.race([other.idle.then(() => true), delay(10_000).then(() => false)]);
+    const isReady = await Promise.race([other.idle.then(() => true), delay(80_000).then(() => false)]);
     const { runs: meanwhile } = player;
     assert(isReady && other.runs === 1, 'the run of the other');
     await until(() => player.runs > meanwhile, 'another run of what plays');

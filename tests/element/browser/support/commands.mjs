@@ -1,3 +1,5 @@
+import { setTimeout as delay } from 'node:timers/promises';
+
 /** What tests ask of the browser and cannot do from within a page: real touches, a real wheel, pictures of the screen. */
 export function pageCommands() {
   return {
@@ -12,8 +14,10 @@ export function pageCommands() {
 
 const ACTIONS = {
   /** Touch points of one event: [] lifts all fingers. */
-  'send-touch': (page, { type, points }) =>
-    devtools(page, 'Input.dispatchTouchEvent', { type, touchPoints: points }).then(() => true),
+  'send-touch': (page, { type, points, ms }) =>
+    devtools(page, 'Input.dispatchTouchEvent', { type, touchPoints: points, timestamp: ms && ms / 1000 }).then(
+      () => true,
+    ),
 
   'turn-wheel': async (page, { x, y, deltaY }) => {
     await page.mouse.move(x, y);
@@ -36,9 +40,21 @@ const ACTIONS = {
     return gpu !== undefined;
   },
 
-  /** The picture that the browser composes for a rectangle in CSS pixels: a PNG as base64. */
-  screenshot: async (page, clip) => (await page.screenshot({ clip })).toString('base64'),
+  /** The picture that the browser composes for a rectangle in CSS pixels: a PNG as base64, or `later` where it is still to come and is to be asked for again. */
+  screenshot: async (page, clip) => {
+    const taken = pictures.get(page) ?? page.screenshot({ clip, timeout: 0 });
+    pictures.set(page, taken);
+    const picture = await Promise.race([taken, delay(PATIENCE_MS, 'later')]);
+    if (picture === 'later') return picture;
+    pictures.delete(page);
+    return picture.toString('base64');
+  },
 };
+
+/** Pages are told within this, since their commands give up after 20 s: a GPU process that draws for another page takes its time. */
+const PATIENCE_MS = 10_000;
+/** Pictures that a page waits for. */
+const pictures = new WeakMap();
 
 /** One DevTools session for each page. */
 const sessions = new WeakMap();

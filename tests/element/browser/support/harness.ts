@@ -51,7 +51,7 @@ export async function frames(count = 2): Promise<void> {
 }
 
 /** A machine that is slow, or busy, takes several times as long: what never comes is found all the same. */
-const PATIENCE = 4;
+const PATIENCE = 12;
 
 /** Waits until a condition holds: `limitMs` on a machine that has nothing else to do. */
 export async function until(condition: () => boolean, what: string, limitMs = 20_000): Promise<void> {
@@ -110,17 +110,26 @@ export async function showLoaded(
 }
 
 /**
- * Waits until an element shows its true image and the page has drawn nothing for a while: a single frame that says so may still be followed by one of a
- * motion that has just begun.
+ * Waits until an element shows its true image and the page has drawn nothing for a while, and for a few of its frames: a single frame that says so may still be
+ * followed by one of a motion that has just begun, and a machine that stands still for a while has no frames in it.
  */
 export async function atRest(element: GaussianSplatElement, quietMs = 400, limitMs = 30_000): Promise<void> {
-  let [seen, since] = [submits, performance.now()];
+  let [seen, since, passed, waits] = [submits, performance.now(), 0, true];
+  const count = (): void => {
+    passed++;
+    if (waits) requestAnimationFrame(count);
+  };
+  requestAnimationFrame(count);
   const isQuiet = (): boolean => {
     const now = performance.now();
-    if (submits !== seen || element.stats?.dynamicQuality.drawn !== 'whole') [seen, since] = [submits, now];
-    return now - since > quietMs;
+    if (submits !== seen || element.stats?.dynamicQuality.drawn !== 'whole') [seen, since, passed] = [submits, now, 0];
+    return now - since > quietMs && passed > 4;
   };
-  await until(isQuiet, 'the true image', limitMs);
+  try {
+    await until(isQuiet, 'the true image', limitMs);
+  } finally {
+    waits = false;
+  }
   await frames(2);
 }
 

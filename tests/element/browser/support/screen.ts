@@ -46,7 +46,9 @@ export class Screen {
 export async function screenOf(element: Element): Promise<Screen> {
   await frames();
   const { x, y, width, height } = element.getBoundingClientRect();
-  const png = await executeServerCommand<string, object>('screenshot', { x, y, width, height });
+  const take = (): Promise<string> => executeServerCommand<string, object>('screenshot', { x, y, width, height });
+  let png = await take();
+  while (png === 'later') png = await take();
   const bytes = Uint8Array.from(atob(png), (c) => c.charCodeAt(0));
   const image = await createImageBitmap(new Blob([bytes]));
   const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
@@ -75,9 +77,23 @@ export interface Finger {
   readonly id?: number;
 }
 
-/** One touch event with the fingers that are down. */
-export const sendTouch = (type: 'touchStart' | 'touchMove' | 'touchEnd', points: readonly Finger[]): Promise<unknown> =>
-  executeServerCommand('send-touch', { type, points });
+/** One touch event with the fingers that are down. @param ms when it happened, since the epoch; undefined for now */
+export const sendTouch = (
+  type: 'touchStart' | 'touchMove' | 'touchEnd',
+  points: readonly Finger[],
+  ms?: number,
+): Promise<unknown> => executeServerCommand('send-touch', { type, points, ms });
+
+/** Taps of one finger, at times of their own: a busy machine does not draw them apart. */
+export class Taps {
+  #ms = Date.now();
+
+  /** @param pauseMs since the tap before */
+  async tap(x: number, y: number, pauseMs = 80): Promise<void> {
+    await sendTouch('touchStart', [{ x, y, id: 1 }], (this.#ms += pauseMs));
+    await sendTouch('touchEnd', [], (this.#ms += 40));
+  }
+}
 
 export const turnWheel = (x: number, y: number, deltaY: number): Promise<unknown> =>
   executeServerCommand('turn-wheel', { x, y, deltaY });

@@ -41,11 +41,18 @@ const gates = new Map();
 function gateOf(name) {
   if (!gates.has(name)) {
     let open;
-    const opened = new Promise((resolve) => (open = resolve));
-    gates.set(name, { opened, open });
+    const gate = {
+      isOpen: false,
+      opened: new Promise((resolve) => (open = resolve)),
+      open: () => open((gate.isOpen = true)),
+    };
+    gates.set(name, gate);
   }
   return gates.get(name);
 }
+
+/** Bytes of what comes through a closed gate at a time. */
+const DROP = 16_384;
 
 /** By folder: what tests have put there, and what was asked for. */
 const kept = new Map();
@@ -85,19 +92,23 @@ const ANSWERS = {
     context.status = 204;
   },
 
-  /** A PLY of `n` splats of degree 3, 248 bytes each, in pieces of 4 MB over `ms` milliseconds: a cube of noise, some of it of no use. */
+  /** A PLY of `n` splats of degree 3, 248 bytes each, in pieces of 4 MB, the second half in drops until a gate opens, if one is named: a cube of noise, some of it of no use. */
   'large-ply'(context) {
-    const { n = 200_000, ms = 0 } = context.query;
+    const { n = 200_000, gate } = context.query;
     const { header, block } = largePly(Number(n));
-    const length = header.length + 248 * Number(n);
+    const size = 248 * Number(n);
     context.type = 'application/octet-stream';
-    context.set('Content-Length', String(length));
+    context.set('Content-Length', String(header.length + size));
     context.body = Readable.from(
       (async function* pieces() {
         yield header;
-        for (let left = 248 * Number(n); left > 0; left -= block.length) {
-          await delay((Number(ms) * block.length) / length);
-          yield block.subarray(0, Math.min(left, block.length));
+        for (let sent = 0; sent < size;) {
+          const isHeld = gate && sent >= size / 2 && !gateOf(gate).isOpen;
+          if (isHeld) await delay(100);
+          const at = sent % block.length;
+          const piece = block.subarray(at, at + Math.min(isHeld ? DROP : block.length, size - sent));
+          yield piece;
+          sent += piece.length;
         }
       })(),
     );
