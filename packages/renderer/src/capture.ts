@@ -4,7 +4,7 @@ import type { FrameRequest } from './frame-request.js';
 import type { FrameSettings, FrameTarget } from './frame-target.js';
 import type { Renderer } from './renderer.js';
 import { requireTextureSize } from './requirements.js';
-import type { Viewpoint } from './viewpoint.js';
+import type { UncheckedViewpoint } from './viewpoint.js';
 
 /** Rows of a texture copy start at multiples of this many bytes. */
 const ROW_ALIGNMENT = 256;
@@ -22,12 +22,12 @@ export interface CaptureRequest extends Omit<FrameTarget, 'target'> {
 /**
  * Draws one image and reads it back in float32, before any rounding to 8 bits. Drawn again where the renderer's buffers had no
  * room for all of it.
- * @throws GaussianSplatError as {@link Viewpoint.draw} does, before anything is allocated.
+ * @throws GaussianSplatError as {@link UncheckedViewpoint.draw} does, before anything is allocated.
  * @returns [height, width, 4] premultiplied red, green, blue and alpha, row by row from the top.
  */
 export async function capture(
   device: GPUDevice,
-  viewpoint: Viewpoint,
+  viewpoint: UncheckedViewpoint,
   request: CaptureRequest | Omit<FrameRequest, 'target' | 'targetFormat'>,
 ): Promise<Float32Array> {
   validateCamera(request.camera);

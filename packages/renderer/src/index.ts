@@ -1,4 +1,5 @@
 export { capture, type CaptureRequest } from './capture.js';
+export { Viewpoint } from './checked-viewpoint.js';
 export { createRenderer } from './choice/choose.js';
 export { autotune, startVariants, type AutotuneOptions, type StartOptions } from './choice/choose.js';
 export type { AutotuneStore } from './choice/kept-choice.js';
@@ -58,7 +59,7 @@ export {
   type TargetView,
 } from './frame-target.js';
 export { Renderer } from './renderer.js';
-export { Viewpoint, type View, type ViewpointOptions } from './viewpoint.js';
+export { UncheckedViewpoint, type View, type ViewpointOptions } from './viewpoint.js';
 export { boundsOfWorld } from './world-bounds.js';
 export { Placement, World, type Box, type Placed } from './world.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';

@@ -77,6 +77,8 @@ const EXACT: RenderSettings = {
   resolutionScale: 1,
 };
 
+type SomeSettings = Partial<RenderSettings> & { readonly quality?: Quality };
+
 /** A named mix of settings: see {@link QUALITIES}. */
 export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
 
@@ -131,19 +133,22 @@ const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>
   shDegree: [0, 1, 2, 3],
 };
 
+/** The settings of a quality, with those that differ from it. */
+export function completed(options: SomeSettings): RenderSettings {
+  const base = QUALITIES[options.quality ?? 'default'];
+  const names = Object.keys(base) as (keyof RenderSettings)[];
+  return Object.fromEntries(names.map((name) => [name, options[name] ?? base[name]])) as unknown as RenderSettings;
+}
+
 /**
- * The settings of a quality, with those that differ from it.
+ * The same, checked.
  * @throws GaussianSplatError `argument/value` for a number out of range, a name that its setting does not know or an unknown quality.
  */
-export function renderSettingsOf(options: Partial<RenderSettings> & { readonly quality?: Quality }): RenderSettings {
+export function renderSettingsOf(options: SomeSettings): RenderSettings {
   const quality = options.quality ?? 'default';
   if (!Object.hasOwn(QUALITIES, quality)) throw invalid('quality', Object.keys(QUALITIES).join(', '), quality);
-  const base = QUALITIES[quality];
-  const names = Object.keys(base) as (keyof RenderSettings)[];
-  const levers = Object.fromEntries(
-    names.map((name) => [name, options[name] ?? base[name]]),
-  ) as unknown as RenderSettings;
-  for (const name of names) requireInRange(name, levers[name]);
+  const levers = completed(options);
+  for (const name of Object.keys(levers) as (keyof RenderSettings)[]) requireInRange(name, levers[name]);
   if (levers.order === 'pixel' && levers.rasterizer === 'quads') {
     throw invalid('order', "'center' with the rasterizer quads: 'pixel' takes tiles", 'pixel');
   }

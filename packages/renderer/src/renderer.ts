@@ -2,7 +2,7 @@ import type { Camera } from '@gaussian-splat/core';
 import type { FrameRequest, RendererOptions } from './frame-request.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import { requireScenes } from './requirements.js';
-import { Viewpoint } from './viewpoint.js';
+import { Viewpoint } from './checked-viewpoint.js';
 import { World, type Placement } from './world.js';
 
 /** A {@link Viewpoint} whose world is named with each frame: for those who draw one scene after another. */

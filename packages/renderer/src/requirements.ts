@@ -3,7 +3,7 @@ import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { FrameSettings, FrameTarget } from './frame-target.js';
 import { TEXTURE_USAGE } from './gpu/kernel.js';
 import type { RenderSettings } from './render-settings.js';
-import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
+import type { AccumulationFormat } from './rasterizers/rasterizer.js';
 
 export function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
   const limit = device.limits.maxTextureDimension2D;
@@ -42,14 +42,14 @@ export function requireTarget(target: GPUTexture | undefined, format: string, { 
     );
 }
 
-export function requireAuxiliary({ name, takesAuxiliary }: Rasterizer, { order }: Pick<RenderSettings, 'order'>): void {
+export function requireAuxiliary({ rasterizer, order }: Pick<RenderSettings, 'rasterizer' | 'order'>): void {
   if (order === 'pixel')
     throw missing('auxiliary', "settings with order: 'center', or no auxiliary outputs", "order: 'pixel'");
-  if (takesAuxiliary) return;
+  if (rasterizer === 'tiles') return;
   throw new GaussianSplatError('unsupported/limits', {
     where: 'FrameTarget.auxiliary',
     expected: 'settings with the rasterizer tiles',
-    found: name,
+    found: rasterizer,
     remedy: "draw with settings('default', { rasterizer: 'tiles' })",
   });
 }

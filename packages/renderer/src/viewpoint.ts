@@ -10,12 +10,12 @@ import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { orderOn } from './lazy-order.js';
-import { renderSettingsOf, type RenderSettings } from './render-settings.js';
+import { completed, type RenderSettings } from './render-settings.js';
 import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { AuxiliaryFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
-import { requireAuxiliary, requireFrameTarget, requireTarget, requireTextureSize } from './requirements.js';
+import { requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -40,7 +40,7 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
 /** Of a target: a view of more than that is none to draw into. */
 const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
 
-/** Options of a {@link Viewpoint}. */
+/** Options of a {@link UncheckedViewpoint}. */
 export interface ViewpointOptions {
   /** Settings of frames that are given none. They decide what is allocated. */
   readonly settings?: FrameSettings;
@@ -50,7 +50,7 @@ export interface ViewpointOptions {
   readonly onIncomplete?: () => void;
 }
 
-/** One of several views: see {@link Viewpoint.drawAll}. */
+/** One of several views: see {@link UncheckedViewpoint.drawAll}. */
 export interface View {
   readonly camera: Camera;
   readonly picture: FrameTarget;
@@ -77,19 +77,13 @@ interface Engine {
 }
 
 /**
- * Draws a world, on your own device.
- *
- * ```ts
- * const world = new World();
- * world.add({ scene: await GaussianBuffers.upload(device, packGaussians(cloud)) });
- * const viewpoint = new Viewpoint(device, world);
- * viewpoint.draw(camera, { target: texture });
- * ```
+ * A viewpoint that takes its callers at their word: of what it is given, only the camera is checked. For callers that make all of it themselves, such as the
+ * element, whose pages then do not fetch the checks. All others use `Viewpoint`, which has them.
  *
  * Memory is allocated when scenes come, and when the image size or the share of visible splats changes, never while only the camera or a scene moves; no frame
  * waits for a read-back. Each frame sorts the splats that it shows.
  */
-export class Viewpoint {
+export class UncheckedViewpoint {
   readonly world: World;
   readonly #device: GPUDevice;
   /** Of settings that have been met. */
@@ -125,7 +119,7 @@ export class Viewpoint {
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
-    this.#engine = this.#makeEngine(this.#renderSettingsOf(settings));
+    this.#engine = this.#makeEngine(this.resolve(settings));
   }
 
   /** Settings of frames that are given none. */
@@ -137,14 +131,14 @@ export class Viewpoint {
     if (settings === this.#settings) return;
     this.#variants = variantsOf(this.#device);
     this.#known = new WeakMap();
-    const levers = this.#renderSettingsOf(settings);
+    const levers = this.resolve(settings);
     this.#settings = settings;
     this.#useEngine(levers);
   }
 
   /** The settings that {@link settings} come to on this device; nothing is left `auto`. */
   get resolvedSettings(): RenderSettings & Variants {
-    return this.#renderSettingsOf(this.#settings);
+    return this.resolve(this.#settings);
   }
 
   /** Name of the rasterizer in use. */
@@ -171,7 +165,7 @@ export class Viewpoint {
    */
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
     const { rasterizer } = this.#engine;
-    const all = settings.map((each) => this.#renderSettingsOf(each));
+    const all = settings.map((each) => this.resolve(each));
     for (const levers of all) {
       const order = levers.order === 'pixel' ? orderOn(this.#device).now : undefined;
       rasterizer.prepare(levers, targetFormat, order?.paintingOf(levers));
@@ -240,17 +234,16 @@ export class Viewpoint {
     mayDivide: boolean,
   ): Encoded {
     const { auxiliary, timer, depth } = picture;
-    requireFrameTarget(picture, settings);
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
+    this.check(camera, picture, settings);
     const target = this.#targetOf(picture, camera);
-    const asked = this.#renderSettingsOf(settings);
+    const asked = this.resolve(settings);
     const order = this.#orderOf(asked);
     this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
     const levers = depth && !order ? { ...asked, depthKeyBits: 32 as const } : asked;
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
-    if (auxiliary) requireAuxiliary(rasterizer, levers);
     const drawn = scaled(camera, levers.resolutionScale);
     depth?.prepare(camera, drawn, rasterizer.name, auxiliary);
     const resources = all.fit(this.world, levers.splatBudget);
@@ -429,10 +422,21 @@ export class Viewpoint {
     return current;
   }
 
-  #renderSettingsOf(settings: FrameSettings): RenderSettings & Variants {
+  /** Throws for a frame that cannot be drawn. */
+  protected check(_camera: Camera, _picture: FrameTarget, _settings: FrameSettings): void {
+    // Its callers know what they do.
+  }
+
+  /** Settings with those that are not given. */
+  protected complete(settings: FrameSettings): RenderSettings {
+    return completed(settings);
+  }
+
+  /** The settings that these come to on this device; nothing is left `auto`. */
+  protected resolve(settings: FrameSettings): RenderSettings & Variants {
     const known = this.#known.get(settings);
     if (known) return known;
-    const made = settle(this.#variants, renderSettingsOf(settings));
+    const made = settle(this.#variants, this.complete(settings));
     this.#known.set(settings, made);
     return made;
   }
@@ -473,10 +477,8 @@ export class Viewpoint {
   #targetOf({ target }: FrameTarget, camera: Camera): Target {
     const { width, height } = camera;
     if (!isTexture(target)) {
-      requireTarget(undefined, target.format, camera);
       return { view: target.view, format: target.format, isStorable: false, width, height };
     }
-    requireTarget(target, target.format, camera);
     let view = this.#views.get(target);
     if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;

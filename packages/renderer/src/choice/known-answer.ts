@@ -6,7 +6,7 @@ import { packKept, type PackedGaussians } from '../pack/pack.js';
 import type { ShPrecision } from '../pack/sh.js';
 import type { GaussianScene } from '../gaussian-scene.js';
 import type { FrameSettings } from '../frame-target.js';
-import { Viewpoint } from '../viewpoint.js';
+import { UncheckedViewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 
 /** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
@@ -31,10 +31,10 @@ export async function givesKnownAnswer(device: GPUDevice, options: FrameSettings
 }
 
 /** A viewpoint of one scene alone. */
-export function viewpointOf(device: GPUDevice, scene: GaussianScene, settings: FrameSettings): Viewpoint {
+export function viewpointOf(device: GPUDevice, scene: GaussianScene, settings: FrameSettings): UncheckedViewpoint {
   const world = new World();
   world.add({ scene });
-  return new Viewpoint(device, world, { settings });
+  return new UncheckedViewpoint(device, world, { settings });
 }
 
 /** A camera that looks at the spheres askew, so that a transposed matrix shows. */

@@ -3,7 +3,7 @@ import { GaussianBuffers } from '../gaussian-buffers.js';
 import type { mortonOrder } from '../pack/morton.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { QueueClock } from '../gpu/queue-clock.js';
-import { Viewpoint } from '../viewpoint.js';
+import { UncheckedViewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { Variants } from '../variants.js';
 import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
@@ -32,7 +32,7 @@ export const isRight = (device: GPUDevice, variants: Variants, format?: GPUTextu
 
 /** Asks for the pipelines of a first picture. */
 function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat): void {
-  const renderer = new Viewpoint(device, new World(), { settings: variants });
+  const renderer = new UncheckedViewpoint(device, new World(), { settings: variants });
   renderer.prepare([{}], format);
   renderer.destroy();
 }

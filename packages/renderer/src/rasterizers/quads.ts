@@ -19,7 +19,6 @@ type Program = ShaderProgram<typeof rasterizeQuads>;
 /** Hardware quads, back to front, blended into a float texture. */
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
-  readonly takesAuxiliary = false;
   readonly #device: GPUDevice;
   readonly #program: Program;
   readonly #format: AccumulationFormat;

@@ -142,8 +142,6 @@ export interface Slice {
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
-  /** True if it can take {@link AuxiliaryOutputs}. */
-  readonly takesAuxiliary: boolean;
   /** Bytes of GPU memory held. */
   readonly byteLength: number;
   /** `Plan` of the pairs of splat and bin, where there are pairs. */

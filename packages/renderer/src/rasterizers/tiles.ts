@@ -73,7 +73,6 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
-  readonly takesAuxiliary = true;
   readonly #device: GPUDevice;
   readonly #accumulation: AccumulationFormat;
   readonly #memory: GpuMemory;
