@@ -1,11 +1,11 @@
-import type { Vector3 } from '@gaussian-splat/core';
+import { loadModule, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
 import { viewName, type ViewName } from './camera/spoken.js';
 import type { SpokenStrings } from './words.js';
 import { AnnouncerController, type AnnouncerHost } from './controllers/announcer-controller.js';
-import { AutoRotateController, type AutoRotateHost } from './controllers/auto-rotate-controller.js';
+import type { AutoRotateController, AutoRotateHost } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { FlyHost } from './controllers/fly-controller.js';
 import type { InputOptions } from './controllers/input-controller.js';
@@ -21,6 +21,7 @@ export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
   readonly strings: SpokenStrings;
   readonly surface: HTMLElement | null;
   requestFrame(): void;
+  warn(sentence: string): void;
 }
 
 /** All that happens around the camera besides a person's own hands: turning, prompting, flying, speaking. */
@@ -30,24 +31,25 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   readonly motion: MotionController;
   readonly #host: BehaviourHost;
   readonly #element: ReactiveControllerHost;
-  readonly #autoRotate: AutoRotateController;
   readonly #movers: Mover[];
+  #autoRotate: AutoRotateController | undefined;
+  #turning: Promise<void> | undefined;
   #isFlyLoaded = false;
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviourHost) {
     this.#host = host;
     this.#element = element;
     this.motion = new MotionController(element, this);
-    this.#autoRotate = new AutoRotateController(element, this);
     this.prompt = new PromptController(element, this);
     this.announcer = new AnnouncerController(element, this);
-    this.#movers = [this.#autoRotate, this.prompt];
+    this.#movers = [this.prompt];
     let motion: MediaQueryList | undefined;
     const onMotion = (): void => element.requestUpdate();
     element.addController({
       hostUpdated: () => {
         this.camera.pivot = this.#flies ? 'eye' : 'target';
         if (this.mayFly && !this.#isFlyLoaded) void this.#loadFly();
+        if (this.autoRotates) this.#loadTurning();
       },
       hostConnected: () => {
         // From the picture to the button inside counts, too.
@@ -118,7 +120,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   }
 
   startTurning(): void {
-    this.#autoRotate.start();
+    this.#autoRotate?.start();
   }
 
   flyBy(right: number, up: number, forward: number): void {
@@ -143,6 +145,23 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     this.#element.requestUpdate();
   }
 
+  /** So do those that turn. */
+  #loadTurning(): void {
+    this.#turning ??= loadModule(
+      'the code that turns the camera',
+      () => import('./controllers/auto-rotate-controller.js'),
+    ).then(
+      ({ AutoRotateController }) => {
+        this.add((this.#autoRotate = new AutoRotateController(this.#element, this)));
+        this.#element.requestUpdate();
+      },
+      (error: Error) => {
+        this.#turning = undefined;
+        this.#host.warn(error.message);
+      },
+    );
+  }
+
   /** Something else that moves the camera by itself. */
   add(mover: Mover): void {
     this.#movers.push(mover);
@@ -150,7 +169,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
 
   /** What turns by itself waits once more. */
   rest(): void {
-    this.#autoRotate.rest();
+    this.#autoRotate?.rest();
   }
 
   /** Moves what moves by itself on to a frame. */
