@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
 import { QueueClock, type WorkTime } from '@gaussian-splat/renderer';
-import { fetchLaw, PaceController } from '../../packages/element/src/controllers/pace-controller.js';
+import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
 import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import { LEVELS } from '../support/pace-gpu.js';
 
@@ -130,8 +130,6 @@ test('a frame that is told of late, since the thread was busy, took something be
     }
   }
 });
-
-await fetchLaw();
 
 /** Turns for three seconds. @returns the level at the end */
 async function turn(page: Page, work: number, looks = 0, onFrame: () => void = () => undefined): Promise<string> {

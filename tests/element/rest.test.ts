@@ -3,7 +3,6 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { DetailController } from '../../packages/element/src/controllers/detail-controller.js';
 import {
-  fetchLaw,
   PaceController,
   type FramePlan,
   type PaceOptions,
@@ -13,8 +12,6 @@ import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaus
 import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
 import { waitForRest } from '../../packages/element/src/pace/start.js';
 import { COSTS, LEVELS } from '../support/pace-gpu.js';
-
-await fetchLaw();
 
 const INTERVAL = 1000 / 60;
 const PIXELS = 1e6;

@@ -1,7 +1,8 @@
 /** Simulated GPUs under the pace of moving pictures, and what is asked of the levels that it chose. */
 import type { Level } from '../../packages/element/src/pace/ladder.js';
 import { keepPace } from '../../packages/element/src/pace/pace.js';
-import { INITIAL_PACE, quantile, type Pace } from '../../packages/element/src/pace/start.js';
+import { quantile } from '../../packages/element/src/pace/display-interval.js';
+import { INITIAL_PACE, type Pace } from '../../packages/element/src/pace/start.js';
 import { randomSource } from './gpu.js';
 
 /** Levels that do not change with the element's. */

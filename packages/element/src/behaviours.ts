@@ -11,7 +11,7 @@ import type { FlyHost } from './controllers/fly-controller.js';
 import type { InputOptions } from './controllers/input-controller.js';
 import { MotionController, type MotionHost } from './controllers/motion-controller.js';
 import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/mover.js';
-import { PromptController, type PromptHost } from './controllers/prompt-controller.js';
+import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
 
 /** What the behaviours ask of their element. */
 export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
@@ -26,12 +26,13 @@ export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
 
 /** All that happens around the camera besides a person's own hands: turning, prompting, flying, speaking. */
 export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, AnnouncerHost, MotionHost {
-  readonly prompt: PromptController;
+  /** Comes with what lets people move the camera. */
+  prompt: PromptController | undefined;
   readonly announcer: AnnouncerController;
   readonly motion: MotionController;
   readonly #host: BehaviourHost;
   readonly #element: ReactiveControllerHost;
-  readonly #movers: Mover[];
+  readonly #movers: Mover[] = [];
   #autoRotate: AutoRotateController | undefined;
   #turning: Promise<void> | undefined;
   #isFlyLoaded = false;
@@ -40,9 +41,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     this.#host = host;
     this.#element = element;
     this.motion = new MotionController(element, this);
-    this.prompt = new PromptController(element, this);
     this.announcer = new AnnouncerController(element, this);
-    this.#movers = [this.prompt];
     let motion: MediaQueryList | undefined;
     const onMotion = (): void => element.requestUpdate();
     element.addController({
@@ -162,6 +161,11 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     );
   }
 
+  promptBy(prompt: PromptController): void {
+    this.add((this.prompt = prompt));
+    this.#element.requestUpdate();
+  }
+
   /** Something else that moves the camera by itself. */
   add(mover: Mover): void {
     this.#movers.push(mover);
@@ -208,7 +212,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   }
 
   #touched(): void {
-    this.prompt.dismiss();
+    this.prompt?.dismiss();
     this.rest();
   }
 

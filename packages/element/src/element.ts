@@ -308,7 +308,7 @@ export class GaussianSplatElement extends ViewingMethods {
       progress,
       error,
       hasPoster: this.#hasPoster,
-      prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
+      prompt: !prompt?.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       motion: motion.switch,
       onMotion: this.#onMotion,
       onReset: this.stage.offersReset ? this.#onReset : null,

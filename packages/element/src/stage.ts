@@ -25,8 +25,9 @@ import type { DetailLevers, LoadedGaussians } from './gpu/loaded-gaussians.js';
 import type { GeneratorInput } from './live/inputs.js';
 import { Member } from './member.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
-import { SceneQueries, type QueryHost } from './scene-queries.js';
+import type { QueryHost } from './position-from-point.js';
 import type { Source, StageHost } from './stage-host.js';
+import type { ScenePoint } from './camera/values.js';
 import type { Tour, TourHost } from './views/tour.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 
@@ -58,7 +59,6 @@ export class Stage
   readonly behaviours: Behaviours;
   /** Labels of the page, where there are some. */
   hotspots: HotspotController | undefined;
-  readonly queries: SceneQueries;
   /** All that is drawn. */
   readonly world = new World();
   /** What is drawn of the element's own scene. */
@@ -101,7 +101,6 @@ export class Stage
     this.reveal = new RevealController(element, this);
     this.behaviours = new Behaviours(element, this);
     new PrintController(element, () => this.drawNow());
-    this.queries = new SceneQueries(this);
     const onPageVisibility = (): void => this.suspend();
     element.addController({
       hostConnected: () => {
@@ -145,7 +144,7 @@ export class Stage
     if (shown.length === 0) return null;
     return statsOf(shown, {
       quality: this.attributes.quality,
-      dynamicQuality: this.view.pace.report,
+      dynamicQuality: this.view.dynamicQuality,
       counts: this.#counts,
       isPreview: this.scene.isPreview,
       frameBytes: this.view.painter?.byteLength ?? 0,
@@ -235,8 +234,9 @@ export class Stage
       'the code for mouse, touch and keys',
       () => import('./controllers/input-controller.js'),
     ).then(
-      ({ InputController }) => {
+      ({ InputController, PromptController }) => {
         this.#input = new InputController(this.element, this);
+        this.behaviours.promptBy(new PromptController(this.element, this.behaviours));
       },
       (error: Error) => {
         this.#listening = undefined;
@@ -520,12 +520,24 @@ export class Stage
     return this.behaviours.act(action);
   }
 
+  /** The visible surface under a point of the page: see the element's method of this name. */
+  async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
+    const { positionFromPoint } = await loadModule(
+      'the code that finds points of the scene',
+      () => import('./position-from-point.js'),
+    );
+    return positionFromPoint(this, clientX, clientY);
+  }
+
   /** Beside the scene is where somebody has lost it. */
   pick(clientX: number, clientY: number): void {
-    void this.queries.positionFromPoint(clientX, clientY).then((point) => {
-      if (point === null) this.act({ type: 'reset' });
-      else if (this.input.pan) this.behaviours.aimAt([point.x, point.y, point.z]);
-    });
+    this.positionFromPoint(clientX, clientY).then(
+      (point) => {
+        if (point === null) this.act({ type: 'reset' });
+        else if (this.input.pan) this.behaviours.aimAt([point.x, point.y, point.z]);
+      },
+      (error: Error) => this.warn(error.message),
+    );
   }
 
   /** The space bar, for all that moves. A player's controls around the element have keys of their own. */

@@ -2,7 +2,7 @@ import { loadModule } from '@gaussian-splat/core';
 import type { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
-import type { SceneBox } from './scene-queries.js';
+import { boxOf, type SceneBox } from './scene-queries.js';
 import type { CameraView } from './views/camera-view.js';
 import type { FlightOptions, PathOptions } from './views/tour.js';
 
@@ -100,7 +100,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** Lets the interaction prompt come again, as if no visitor had touched the scene. */
   resetInteractionPrompt(): void {
-    this.stage.behaviours.prompt.reset();
+    this.stage.behaviours.prompt?.reset();
   }
 
   /** Frames the scene as if it had just been loaded: for generators whose scene has grown or gone elsewhere. */
@@ -111,7 +111,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** Box around nearly all of the scene, in metres of viewer space; null while none is shown. */
   getBoundingBox(): SceneBox | null {
-    return this.stage.queries.box;
+    return boxOf(this.stage);
   }
 
   /**
@@ -121,7 +121,7 @@ export abstract class ViewingMethods extends MediaProperties {
    * @returns null beside the scene, and where it is more transparent than not.
    */
   positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
-    return this.stage.queries.positionFromPoint(clientX, clientY);
+    return this.stage.positionFromPoint(clientX, clientY);
   }
 
   /** Where the hotspot of a slot is now, for example `hotspot-door`; null if there is none with a position. */

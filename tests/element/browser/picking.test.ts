@@ -124,10 +124,9 @@ describe('positionFromPoint', () => {
     const [x, y] = pageOf(element, [1, 0, 0]);
     const taps = new Taps();
     let picks = 0;
-    const { queries } = (element as unknown as { stage: { queries: { positionFromPoint: () => Promise<unknown> } } })
-      .stage;
-    const ask = queries.positionFromPoint.bind(queries);
-    queries.positionFromPoint = (...place) => (picks++, ask(...place));
+    const { stage } = element as unknown as { stage: { positionFromPoint: () => Promise<unknown> } };
+    const ask = stage.positionFromPoint.bind(stage);
+    stage.positionFromPoint = (...place) => (picks++, ask(...place));
     await taps.tap(x, y);
     await taps.tap(x, y);
     await delay(400);

@@ -13,6 +13,8 @@ import {
   type Point,
 } from '../camera/gestures.js';
 
+export { PromptController } from './prompt-controller.js';
+
 /** What people may do. */
 export interface InputOptions {
   readonly enabled: boolean;

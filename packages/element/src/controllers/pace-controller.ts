@@ -1,25 +1,13 @@
-import { loadModule } from '@gaussian-splat/core';
 import type { PerFrameSettings, WorkTime } from '@gaussian-splat/renderer';
-import type { FrameScheduler } from '../gpu/frame-scheduler.js';
+import { targetMsOf, type FrameScheduler } from '../gpu/frame-scheduler.js';
 import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
-import type { keepPace, resized } from '../pace/pace.js';
-import { INITIAL_PACE, quantile, waitForRest, type Pace, type PaceReason } from '../pace/start.js';
+import { keepPace, resized } from '../pace/pace.js';
+import { quantile } from '../pace/display-interval.js';
+import { INITIAL_PACE, waitForRest, type Pace, type PaceReason } from '../pace/start.js';
 
-/** How levels are chosen: nothing that a first picture waits for. Without it all pictures are whole. */
-let law: { readonly keepPace: typeof keepPace; readonly resized: typeof resized } | undefined;
-let fetching: Promise<void> | undefined;
+/** All that frames in motion may be drawn with. */
+export const MOVING_LEVERS: readonly Partial<PerFrameSettings>[] = LADDER.flatMap(({ levers }) => levers ?? []);
 
-/** Fetches the law, once for all elements. Fulfils, and never rejects, when it is there or cannot be had. */
-export const fetchLaw = (): Promise<void> =>
-  (fetching ??= loadModule('the code that sets the quality while moving', () => import('../pace/pace.js')).then(
-    (module) => {
-      law = module;
-    },
-    () => undefined,
-  ));
-
-/** Share of the display's interval that frames may take: the page and its compositor need the rest. */
-const SHARE_OF_INTERVAL = 0.8;
 /** A change so soon after another, ms, belongs to the same motion. */
 const MOTION_MS = 150;
 /** Where frames take longer than that, a change within so many of them still does; at most ms. */
@@ -107,12 +95,9 @@ export class PaceController {
     this.#drawn = this.#all[0];
   }
 
-  /** What a frame may take on the GPU, ms: what the page says, else a share of the display's interval, which elements that draw at the same time share. */
+  /** What a frame may take on the GPU, ms. */
   get targetMs(): number {
-    const budget = this.#options.frameBudget();
-    if (budget < Infinity) return budget;
-    const { displayInterval, clients } = this.#options.scheduler();
-    return (SHARE_OF_INTERVAL * displayInterval) / clients;
+    return targetMsOf(this.#options.frameBudget(), this.#options.scheduler());
   }
 
   get report(): DynamicQualityReport {
@@ -155,8 +140,7 @@ export class PaceController {
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
     if (!isOther && levels.length === this.#levels.length) return;
     this.#levels = levels;
-    // Before there is a law all levels are the first.
-    if (law) this.#pace = law.resized(this.#pace, pixels / this.#pixels, this.#levels);
+    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#levels);
     this.#pixels = pixels;
     this.#size++;
   }
@@ -175,8 +159,7 @@ export class PaceController {
     const milliseconds = atMost > targetMs ? atLeast : atMost;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    if (!law) return void fetchLaw();
-    this.#pace = law.keepPace(this.#pace, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
+    this.#pace = keepPace(this.#pace, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
     const isWhole = this.#pace.level === 0;
     if (isWhole || level > 0) this.#options.onPace(isWhole);
   }

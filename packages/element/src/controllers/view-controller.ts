@@ -1,14 +1,13 @@
-import type { Camera } from '@gaussian-splat/core';
-import type { PerFrameSettings, WorkTime } from '@gaussian-splat/renderer';
+import { loadModule, type Camera } from '@gaussian-splat/core';
+import type { WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
+import { targetMsOf, type FrameClient, type FrameScheduler } from '../gpu/frame-scheduler.js';
 import type { CanvasFrame, Contents, Painter, Place, Surface } from '../gpu/painter.js';
 import { why } from '../gpu/request-device.js';
-import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
-import { PaceController } from './pace-controller.js';
+import type * as dynamicQuality from './pace-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
@@ -45,17 +44,26 @@ interface Settle {
   readonly reject: (reason: unknown) => void;
 }
 
-/** All that pictures in motion may be drawn with. */
-const MOVING_LEVERS: readonly Partial<PerFrameSettings>[] = LADDER.flatMap(({ levers }) => levers ?? []);
+/** What sets the quality while moving. Without it all frames are whole, and none waits for it. */
+let quality: typeof dynamicQuality | undefined;
+let fetching: Promise<void> | undefined;
+
+/** Fetches it, once for all elements. Fulfils, and never rejects, when it is there or cannot be had. */
+const fetchQuality = (): Promise<void> =>
+  (fetching ??= loadModule('the code that sets the quality while moving', () => import('./pace-controller.js')).then(
+    (module) => {
+      quality = module;
+    },
+    () => undefined,
+  ));
 
 /** A scene that is replaced sooner, as a preview may be, needs nothing made for it, ms. */
 const PREPARE_AFTER_MS = 300;
 
 /** Draws the scene into the element's canvas, a frame at a time and only when asked. */
 export class ViewController implements FrameClient {
-  /** What frames in motion are drawn with. */
-  readonly pace: PaceController;
   readonly #host: ViewHost;
+  #ownPace: dynamicQuality.PaceController | undefined;
   #painter: Painter | null = null;
   /** What is drawn into, and the device that it was set up for. */
   #surface: Surface | null = null;
@@ -67,13 +75,39 @@ export class ViewController implements FrameClient {
 
   constructor(host: ViewHost) {
     this.#host = host;
-    this.pace = new PaceController({
-      isOn: () => host.attributes.quality === 'auto',
-      scheduler: () => host.scheduler,
-      frameBudget: () => host.attributes.frameBudget,
-      requestFrame: () => this.requestFrame(),
-      onPace: (isWhole) => host.notePace(isWhole),
-    });
+  }
+
+  /** What frames in motion are drawn with; undefined until its code is there. */
+  get #pace(): dynamicQuality.PaceController | undefined {
+    const host = this.#host;
+    return (this.#ownPace ??=
+      quality &&
+      new quality.PaceController({
+        isOn: () => this.#isAuto,
+        scheduler: () => host.scheduler,
+        frameBudget: () => host.attributes.frameBudget,
+        requestFrame: () => this.requestFrame(),
+        onPace: (isWhole) => host.notePace(isWhole),
+      }));
+  }
+
+  get #isAuto(): boolean {
+    return this.#host.attributes.quality === 'auto';
+  }
+
+  /** What frames at rest and in motion are drawn with. */
+  get dynamicQuality(): dynamicQuality.DynamicQualityReport {
+    const { attributes, scheduler } = this.#host;
+    const targetMs = targetMsOf(attributes.frameBudget, scheduler);
+    const atStart = {
+      drawn: 'whole',
+      moving: 'whole',
+      reason: 'start',
+      frameMs: null,
+      lastMs: null,
+      targetMs,
+    } as const;
+    return this.#pace?.report ?? atStart;
   }
 
   /** Asks for a frame, if one would be seen. Free to call often. */
@@ -99,7 +133,7 @@ export class ViewController implements FrameClient {
       });
       this.#painter = painter;
     }
-    this.pace.reset();
+    this.#pace?.reset();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };
       this.requestFrame();
@@ -113,7 +147,7 @@ export class ViewController implements FrameClient {
     // Nobody need wait for it.
     this.#first?.resolve();
     this.#first = undefined;
-    this.pace.stop();
+    this.#pace?.stop();
     this.#host.scheduler.cancel(this);
   }
 
@@ -197,16 +231,15 @@ export class ViewController implements FrameClient {
     this.#drawnContent = content;
     const pixels = request.camera.width * request.camera.height;
     const goesOn = this.#host.camera.isMoving;
-    const plan = this.pace.plan({ now, pixels, hasChanged, goesOn });
-    const { levers } = plan;
+    const pace = this.#pace;
+    const plan = pace?.plan({ now, pixels, hasChanged, goesOn });
     // Who has chosen a quality pays for no clock.
-    const onTime =
-      this.#host.attributes.quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
+    const onTime = pace && plan && this.#isAuto ? (time: WorkTime) => pace.sample(plan, time) : undefined;
     if (first !== undefined) {
       painter.renderFirst(request, content).then(() => this.#afterFirst(painter, first), first.reject);
       return;
     }
-    painter.render({ ...request, levers }, content, onTime);
+    painter.render({ ...request, levers: plan?.levers }, content, onTime);
     this.#prepareSoon(painter);
   }
 
@@ -217,10 +250,14 @@ export class ViewController implements FrameClient {
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
   #prepareSoon(painter: Painter): void {
-    if (painter.isPrepared || this.#host.attributes.quality !== 'auto') return;
+    if (!this.#isAuto) return;
+    const fetched = fetchQuality();
+    if (painter.isPrepared) return;
     this.#preparing ??= setTimeout(() => {
-      this.#preparing = undefined;
-      if (this.#painter === painter) painter.prepare(MOVING_LEVERS);
+      void fetched.then(() => {
+        this.#preparing = undefined;
+        if (this.#painter === painter && quality) painter.prepare(quality.MOVING_LEVERS);
+      });
     }, PREPARE_AFTER_MS);
   }
 

@@ -1,6 +1,6 @@
 /** Loaded only when a page asks what its splats contribute. */
 import type { Camera } from '@gaussian-splat/core';
-import { Viewpoint } from '@gaussian-splat/renderer';
+import { UncheckedViewpoint } from '@gaussian-splat/renderer';
 import type { ReadCounts } from '../stats.js';
 import type { Viewport } from './viewport.js';
 
@@ -34,7 +34,9 @@ async function countContributing({ device, view }: Viewport, camera: Camera): Pr
         .flatMap(({ scene, visible }) => (visible ? scene.pages : []))
         .reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
     );
-  const viewpoint = new Viewpoint(device, world, { settings: { ...settings, rasterizer: 'tiles', order: 'center' } });
+  const viewpoint = new UncheckedViewpoint(device, world, {
+    settings: { ...settings, rasterizer: 'tiles', order: 'center' },
+  });
   const contributions = device.createBuffer({ label: 'gs.contributions', size, usage: STORAGE | COPY_SRC });
   const staging = device.createBuffer({ label: 'gs.contributions.read', size, usage: MAP_READ | COPY_DST });
   const target = device.createTexture({

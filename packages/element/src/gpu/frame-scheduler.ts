@@ -12,6 +12,15 @@ const MEMORY = 8;
 /** When a picture was last drawn in any window, by the page's clock. */
 let lastDrawn = -Infinity;
 
+/** Share of the display's interval that frames may take: the page and its compositor need the rest. */
+const SHARE_OF_INTERVAL = 0.8;
+
+/** What a frame may take on the GPU, ms: what the page says, else a share of the display's interval, which elements that draw at the same time share. */
+export const targetMsOf = (
+  budgetMs: number,
+  { displayInterval, clients }: Pick<FrameScheduler, 'displayInterval' | 'clients'>,
+): number => (budgetMs < Infinity ? budgetMs : (SHARE_OF_INTERVAL * displayInterval) / clients);
+
 /** Milliseconds since a picture was last drawn in any window. */
 export const sinceLastPicture = (): number => performance.now() - lastDrawn;
 

@@ -1,7 +1,7 @@
 import { loadModule, type Camera, type SplatFilter } from '@gaussian-splat/core';
 import {
   QueueClock,
-  Viewpoint,
+  UncheckedViewpoint,
   type PerFrameSettings,
   type FrameSettings,
   type ProbeAnswer,
@@ -16,7 +16,7 @@ import { why } from './request-device.js';
 
 /** Draws frames on one WebGPU device: a viewpoint, whose buffers fit the frame's size, and what stands between it and the canvas. */
 export class Viewport implements Painter {
-  readonly viewpoint: Viewpoint;
+  readonly viewpoint: UncheckedViewpoint;
   readonly #place: Place;
   readonly #contents: Contents;
   readonly #events: PainterEvents;
@@ -33,7 +33,7 @@ export class Viewport implements Painter {
     this.#place = place;
     this.#contents = contents;
     this.#events = events;
-    this.viewpoint = new Viewpoint(place.device, contents.world, {
+    this.viewpoint = new UncheckedViewpoint(place.device, contents.world, {
       settings: this.#settings(),
       onIncomplete: () => {
         this.#drawnSize = '';

@@ -1,5 +1,3 @@
-import { quantile } from './start.js';
-
 /** What displays do that nothing is known of yet, and the slowest that is believed: frames that take too long look like a slow display. */
 const USUAL_MS = 1000 / 60;
 /** No display is faster. */
@@ -8,6 +6,12 @@ const MEMORY = 32;
 const ENOUGH = 8;
 /** Small enough that a frame or two that were late do not matter, large enough for one that came early. */
 const SHARE = 0.2;
+
+/** The smallest of the values that at least this share of them do not exceed. */
+export function quantile(values: readonly number[], share: number): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
+}
 
 /** The time between two pictures of the display, from requestAnimationFrame's clock. */
 export class DisplayInterval {

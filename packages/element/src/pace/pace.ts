@@ -1,6 +1,7 @@
 /** How much of the whole image a frame in motion can afford: a pure function of what frames took. */
 import type { Level } from './ladder.js';
-import { HOLD_MS, INITIAL_PACE, quantile, type Pace, type PaceReason } from './start.js';
+import { quantile } from './display-interval.js';
+import { HOLD_MS, INITIAL_PACE, type Pace, type PaceReason } from './start.js';
 import { inPixels, modelOf, type TimeModel } from './time-model.js';
 
 /** What a frame took. */

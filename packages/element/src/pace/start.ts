@@ -1,4 +1,4 @@
-/** The pace before anything is known, and when a motion is over; the law that the pace follows from then on (`pace.ts`) is fetched once a picture is there. */
+/** The pace before anything is known, and when a motion is over. */
 import type { MeasuredLevels } from './time-model.js';
 
 /** Why the level is what it is: `start`, nothing is known yet; `slow`, frames took too long; `spare`, there was time to spare; `trial`, to find out what a more accurate level takes. */
@@ -43,12 +43,6 @@ export const INITIAL_PACE: Pace = {
   load: 0,
   measured: {},
 };
-
-/** The smallest of the values that at least this share of them do not exceed. */
-export function quantile(values: readonly number[], share: number): number {
-  const sorted = [...values].sort((a, b) => a - b);
-  return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
-}
 
 /** The true image is to be on show so long after the last change, ms. */
 const SHOWN_BY_MS = 300;

@@ -1,0 +1,46 @@
+import type { Camera } from '@gaussian-splat/core';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import { toViewer } from './camera/orbit.js';
+import { unproject } from './camera/projection.js';
+import { ScenePoint } from './camera/values.js';
+import type { CameraController } from './controllers/camera-controller.js';
+import type { ViewController } from './controllers/view-controller.js';
+import { isGone } from './gpu/device-failures.js';
+
+export interface QueryHost {
+  readonly camera: Pick<CameraController, 'viewerFrame'>;
+  /** Looks into the last frame. Rejects if it is gone. */
+  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
+  readonly view: Pick<ViewController, 'painter'>;
+  /** The camera of the last frame, in its pixels; undefined before there is one. */
+  readonly drawnFrom: Camera | undefined;
+  readonly element: HTMLElement;
+}
+
+/**
+ * The visible surface under a point of the page, read back from the GPU beside the frames.
+ * @param clientX CSS pixels, as of a MouseEvent.
+ * @returns null beside the scene, where it is more transparent than not, or if the frame is gone meanwhile.
+ */
+export async function positionFromPoint(host: QueryHost, clientX: number, clientY: number): Promise<ScenePoint | null> {
+  const { camera, view, drawnFrom: drawn, element } = host;
+  const { painter } = view;
+  const { left, top, width, height } = element.getBoundingClientRect();
+  if (drawn === undefined || painter === null || element.clientWidth === 0) return null;
+  // The page's pixels are the element's own, scaled by transforms and zooms around it.
+  const ownX = ((clientX - left) * element.offsetWidth) / width;
+  const ownY = ((clientY - top) * element.offsetHeight) / height;
+  const x = ((ownX - element.clientLeft) * drawn.width) / element.clientWidth;
+  const y = ((ownY - element.clientTop) * drawn.height) / element.clientHeight;
+  if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
+  try {
+    const [answer] = await host.probe([{ x, y }]);
+    if (!answer || answer.depth === null) return null;
+    const point = unproject(drawn, { x, y, depth: answer.depth });
+    return new ScenePoint(...toViewer(camera.viewerFrame, point));
+  } catch (error) {
+    // A device that was lost meanwhile has nothing more to say, and its loss is told elsewhere.
+    if (await isGone(painter)) return null;
+    throw error;
+  }
+}
