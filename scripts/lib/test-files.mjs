@@ -84,7 +84,7 @@ export const isLaboratory = (file) => LABORATORY.some((pattern) => pattern.test(
 
 /** Whether some tests of a file are the laboratory's (`onlyInLab` of tests/support/extent.ts). */
 export const hasBreadth = (file) =>
-  /\bonlyInLab\b|\bisLab\b|\bsomeOf\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
+  /\bonlyInLab\b|\b(is|itIn)Lab\b|\bsomeOf\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
 
 /** Files of Node: those that share a device, those that share a process, and those that have one each. */
 export function byProcess(files) {

@@ -4,5 +4,8 @@ export const isFull = (globalThis as { STABILITY?: string }).STABILITY === 'full
 /** Whether the laboratory's breadth is tested: `npm run test:lab`. */
 export const isLab = isFull || ['lab', 'full'].includes((globalThis as { TESTS?: string }).TESTS ?? '');
 
+/** A test of the laboratory's: one that a clock judges, or that only widens another. */
+export const itInLab = isLab ? it : it.skip;
+
 /** One of two sizes of a test: a part of it in `npm test`, all of it in `npm test -- --full` and `npm run lab:stability`. */
 export const sized = <T>(fast: T, full: T): T => (isFull ? full : fast);

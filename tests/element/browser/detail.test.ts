@@ -1,7 +1,7 @@
 /** Levels of detail of plain files: built when asked for or when the GPU is too slow, drawn as far as the page allows, and gone without a trace. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { isLab } from '../../support/extent-in-pages.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, atRest, claimFault, frames, showLoaded, until } from './support/harness.js';
 
 const ball = (splats: number): string => `/net/ball/red.splat?ms=0&n=${splats}`;
@@ -60,7 +60,7 @@ describe('levels of detail of a plain file', () => {
   });
 
   // By the clock of the controller, which a busy machine draws out.
-  (isLab ? it : it.skip)('are built unasked where a large scene moves too slowly, and rest pictures stay whole', async () => {
+  itInLab('are built unasked where a large scene moves too slowly, and rest pictures stay whole', async () => {
     const element = await showLoaded({ src: ball(50_000), 'camera-orbit': AT_REST }, 'width: 60px; height: 40px');
     // The camera may still be on its way from where the first splats had put it.
     await atRest(element);

@@ -143,7 +143,7 @@ describe('a generator in the element', () => {
   const withoutRate = contractWith({ inputs: { frame: { role: 'frame' } }, duration: 9 });
   for (const [what, src, contract = ''] of [
     ['a scene that does not move', COMPASS],
-    ['a generator that takes no time', '/tests/fixtures/families/avatar-instances.onnx'],
+    ['a generator that takes no time', `${FIXTURES}split.onnx`],
     ['a generator of frames without a number of frames to a second', `${FIXTURES}frames.onnx`, withoutRate],
   ])
     it(`${what} cannot play`, async () => {

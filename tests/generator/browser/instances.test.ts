@@ -4,7 +4,7 @@ import { GaussianSplatElement } from '@gaussian-splat/element';
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
 import { Generator, type GaussianSink, type GeneratorState } from '@gaussian-splat/generator';
 import { assert, assertEqual, delay, nextEvent, showLoaded, until } from '../../element/browser/support/harness.js';
-import { isLab } from '../../support/extent-in-pages.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import {
   calls,
   CAMERA,
@@ -103,7 +103,7 @@ describe('instances of one generator', () => {
     instances.forEach((generator) => generator.close());
   });
 
-  it('of the same frame are one run, whichever callback asks, and nothing is made on the way', async () => {
+  itInLab('of the same frame are one run, whichever callback asks, and nothing is made on the way', async () => {
     const instances = await Promise.all([0, 1, 2].map(() => open('avatar-instances')));
     const scenes = await Promise.all(instances.map(({ model }) => DynamicGaussians.create(device, model.layout)));
     instances.forEach((generator, i) => (generator.sink = scenes[i]));
@@ -150,7 +150,7 @@ describe('instances of one generator', () => {
     renderer.destroy();
   });
 
-  it('cost less together', async () => {
+  itInLab('cost less together', async () => {
     const millisecondsOf = async (name: string): Promise<number> => {
       const eight = await Promise.all(Array.from({ length: 8 }, () => open(name)));
       for (const generator of eight) generator.sink = { ingest: () => undefined };
@@ -171,7 +171,7 @@ describe('instances of one generator', () => {
     assert(together < 0.7 * apart, `${together} ms in one run, ${apart} ms in eight`);
   });
 
-  it('come and go', async () => {
+  itInLab('come and go', async () => {
     const errors: unknown[] = [];
     const wanted = new Map<number, number[]>();
     const make = async (): Promise<{ generator: Generator; sink: NumberSink }> => {
@@ -277,37 +277,36 @@ describe('instances of one generator', () => {
   });
 
   // Twelve times 40,000 Gaussians a run: on SwiftShader that takes minutes. `examples.test.ts` looks at the file itself.
-  if (isLab)
-    it('of the avatar that ships: ten are one run a frame', async () => {
-      const url = '/demo/generators/walker/model.onnx';
-      const ten = await Promise.all(
-        Array.from({ length: 10 }, () => Generator.open({ url }, device, { onError: reportError, compare: false })),
-      );
-      const taken = ten.map((generator) => {
-        const rows = new Set<number>();
-        generator.sink = { ingest: (_tensors, _rows, instance) => void rows.add(instance) };
-        return rows;
+  itInLab('of the avatar that ships: ten are one run a frame', async () => {
+    const url = '/demo/generators/walker/model.onnx';
+    const ten = await Promise.all(
+      Array.from({ length: 10 }, () => Generator.open({ url }, device, { onError: reportError, compare: false })),
+    );
+    const taken = ten.map((generator) => {
+      const rows = new Set<number>();
+      generator.sink = { ingest: (_tensors, _rows, instance) => void rows.add(instance) };
+      return rows;
+    });
+    const joints = ten[0].model.contract.inputs.pose as { joints: readonly string[] };
+    const frame = async (number: number): Promise<number> => {
+      const before = runs.count;
+      ten.forEach((generator, i) => {
+        const pose = Array.from({ length: 3 * joints.joints.length }, (_, k) => 0.2 * Math.sin(k + i + number));
+        generator.request({ pose });
       });
-      const joints = ten[0].model.contract.inputs.pose as { joints: readonly string[] };
-      const frame = async (number: number): Promise<number> => {
-        const before = runs.count;
-        ten.forEach((generator, i) => {
-          const pose = Array.from({ length: 3 * joints.joints.length }, (_, k) => 0.2 * Math.sin(k + i + number));
-          generator.request({ pose });
-        });
-        await Promise.all(ten.map(({ idle }) => idle));
-        return runs.count - before;
-      };
-      await frame(0);
-      assertEqual([await frame(1), await frame(2)], [1, 1], 'runs in a frame of ten');
-      assertEqual(
-        taken.map((rows) => [...rows]),
-        ten.map((_, i) => [i]),
-        'the instance that each takes',
-      );
-      assertEqual(ten[0].kind, 'captured');
-      ten.forEach((generator) => generator.close());
-    }).timeout(500_000);
+      await Promise.all(ten.map(({ idle }) => idle));
+      return runs.count - before;
+    };
+    await frame(0);
+    assertEqual([await frame(1), await frame(2)], [1, 1], 'runs in a frame of ten');
+    assertEqual(
+      taken.map((rows) => [...rows]),
+      ten.map((_, i) => [i]),
+      'the instance that each takes',
+    );
+    assertEqual(ten[0].kind, 'captured');
+    ten.forEach((generator) => generator.close());
+  }).timeout(500_000);
 
   it('are elements of one page, at times of their own, in one run a frame', async () => {
     GaussianSplatElement.runtimeLocation = RUNTIME;

@@ -36,7 +36,9 @@ export function hurry(speed: number): void {
   Object.assign(pageTime, { since: now, shown: shownAt(now), speed });
   performance.now = () => shownAt(real.now());
   Object.assign(globalThis, {
-    setTimeout: (callback: () => void, ms = 0) => real.setTimeout(callback, ms / pageTime.speed),
+    // Nobody waits for what comes after a minute: it is the limit of something that may hang.
+    setTimeout: (callback: () => void, ms = 0) =>
+      real.setTimeout(callback, ms < 60_000 ? ms / pageTime.speed : ms * PATIENCE),
     requestAnimationFrame: (callback: FrameRequestCallback) =>
       real.requestAnimationFrame((time) => callback(shownAt(time))),
   });
