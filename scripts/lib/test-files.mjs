@@ -10,18 +10,18 @@ import { root } from './run.mjs';
 const LABORATORY = [
   /^tests\/economise\/(?!command|live-mask)/,
   /^tests\/bench\/(scene|pages)/,
-  /^tests\/frameworks\/browser\/(plain|react-strict|vue|scenes-vue)/,
+  /^tests\/frameworks\/browser\/(plain|react-strict|rendered|scenes|vue)/,
   /^tests\/site\/(compare|cost-card|playground)/,
   /^tests\/check\/browser\//,
-  // Clocks, large files, long lives, a dense screen and the controls of others.
-  /^tests\/element\/browser\/(high-density|lives|loads-apart|media-chrome|pace|previews)/,
-  // Every family and the examples; the mechanism is tested by session, proof, shapes and element.
-  /^tests\/generator\/browser\/(examples\/|families|orbit|picture-pair|post-unreachable|provider|scenes)/,
+  // Clocks, large files, long lives, other documents, a dense screen and the controls of others.
+  /^tests\/element\/browser\/(documents|high-density|large-ply|lives|loads-apart|media-chrome|pace|previews)/,
+  // Every family, the examples, and each way in; the mechanism is tested by session, proof, faults, element, instances and post-element.
+  /^tests\/generator\/browser\/(controls|examples\/|families|models|orbit|picture|post-unreachable|provider|scenes|shapes)/,
   // What `npm run release` makes.
   /^tests\/packages\/release/,
   // Stages and WebGL are tested in Node and in the element; losses of the device in device.
   /^tests\/stages\/browser\//,
-  /^tests\/stability\/browser\/(device-loss|gpu-crash|resize)/,
+  /^tests\/stability\/browser\/(device-loss|gpu-crash|memory-budget|resize)/,
 ];
 /** Tests in Chromium that look at what happens in time, or have the server lose files: no other page runs beside them. */
 const TIMING = [

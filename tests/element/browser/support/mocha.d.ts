@@ -9,7 +9,8 @@ interface MochaTest {
 }
 type MochaBody = (this: MochaContext) => void | Promise<void>;
 declare function describe(title: string, body: () => void): void;
-declare function it(title: string, body: MochaBody): MochaTest;
+type MochaIt = (title: string, body: MochaBody) => MochaTest;
+declare const it: MochaIt & { readonly skip: MochaIt };
 declare function before(body: MochaBody): void;
 declare function after(body: MochaBody): void;
 declare function beforeEach(body: MochaBody): void;
