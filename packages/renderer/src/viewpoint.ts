@@ -236,7 +236,7 @@ export class UncheckedViewpoint {
     const { auxiliary, timer, depth } = picture;
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
-    this.check(camera, picture, settings);
+    this.check?.(camera, picture, settings);
     const target = this.#targetOf(picture, camera);
     const asked = this.resolve(settings);
     const order = this.#orderOf(asked);
@@ -422,10 +422,8 @@ export class UncheckedViewpoint {
     return current;
   }
 
-  /** Throws for a frame that cannot be drawn. */
-  protected check(_camera: Camera, _picture: FrameTarget, _settings: FrameSettings): void {
-    // Its callers know what they do.
-  }
+  /** Throws for a frame that cannot be drawn; absent where callers know what they do. */
+  protected check?(camera: Camera, picture: FrameTarget, settings: FrameSettings): void;
 
   /** Settings with those that are not given. */
   protected complete(settings: FrameSettings): RenderSettings {
