@@ -27,7 +27,7 @@ window.Worker = class extends Worker {
 };
 
 /** Workers that take their time, on a machine that is busy, are none that do not come. */
-beforeEach(() => hurry(0.1));
+beforeEach(() => hurry(0.3));
 
 describe('the scene worker', () => {
   it('is one for all elements, ends when idle, and starts again', async () => {
@@ -40,7 +40,7 @@ describe('the scene worker', () => {
     assertEqual(workers.length, 1, 'workers');
     hurry(3);
     await until(() => workers[0].isEnded, 'the end of an idle worker');
-    hurry(0.1);
+    hurry(0.3);
     await showLoaded();
     assertEqual(workers.length, 2, 'workers after another load');
   });
@@ -49,7 +49,7 @@ describe('the scene worker', () => {
     const element = show({ src: '/net/slow/compass.ply?ms=3000' });
     await until(() => workers.some(({ isEnded }) => !isEnded), 'a worker');
     await nextEvent(element, 'progress');
-    await delay(60);
+    await delay(200);
     const { worker } = workers[workers.length - 1];
     worker.dispatchEvent(new ErrorEvent('error', { message: 'out of memory', cancelable: true }));
     await element.ready;
