@@ -17,6 +17,8 @@ const LABORATORY = [
   /^tests\/element\/browser\/(documents|high-density|large-ply|lives|loads-apart|media-chrome|pace|previews)/,
   // Every family, the examples, and each way in; the mechanism is tested by session, proof, faults, element, instances and post-element.
   /^tests\/generator\/browser\/(controls|examples\/|families|models|orbit|picture|post-unreachable|provider|scenes|shapes)/,
+  // three.js beside the element; meshes draw with it in npm test.
+  /^tests\/three\/browser\//,
   // What `npm run release` makes.
   /^tests\/packages\/release/,
   // Stages and WebGL are tested in Node and in the element; losses of the device in device.

@@ -9,3 +9,12 @@ export const itInLab = isLab ? it : it.skip;
 
 /** One of two sizes of a test: a part of it in `npm test`, all of it in `npm test -- --full` and `npm run lab:stability`. */
 export const sized = <T>(fast: T, full: T): T => (isFull ? full : fast);
+
+/**
+ * Some of the cases of a test, evenly chosen: all of them in the laboratory.
+ * @param count how many `npm test` keeps
+ */
+export function someOf<T>(cases: readonly T[], count: number): readonly T[] {
+  if (isLab || cases.length <= count) return cases;
+  return Array.from({ length: count }, (_, k) => cases[Math.floor((k * cases.length) / count)]);
+}

@@ -1,5 +1,6 @@
 import '@gaussian-splat/element';
 import { GaussianSplatElement, SharedDevice } from '@gaussian-splat/element';
+import { itInLab } from '../../support/extent-in-pages.js';
 import {
   assert,
   assertEqual,
@@ -164,7 +165,7 @@ describe('the loss of the device', () => {
     assertEqual(String(element.getCameraOrbit()), before);
   });
 
-  it('six times, every other time again in the middle of the recovery, ends with the same picture', async () => {
+  itInLab('six times, every other time again in the middle of the recovery, ends with the same picture', async () => {
     const element = await showLoaded();
     const before = await screenOf(element);
     const seen: string[] = [];
@@ -191,7 +192,7 @@ describe('the loss of the device', () => {
     );
   });
 
-  it('of several elements brings all of them back on one new device', async () => {
+  itInLab('of several elements brings all of them back on one new device', async () => {
     const elements = await Promise.all([showLoaded(), showLoaded(), showLoaded({ src: `${FIXTURES}green.splat` })]);
     const before = devices.length;
     devices[before - 1].destroy();
@@ -270,7 +271,7 @@ describe('the loss of the device', () => {
     }
   });
 
-  it('leaves no empty picture: toBlob() has the picture, or says why not', async () => {
+  itInLab('leaves no empty picture: toBlob() has the picture, or says why not', async () => {
     const element = await showLoaded();
     const size = async (blob: Blob): Promise<number> => {
       const { width, height } = await createImageBitmap(blob);
@@ -305,7 +306,7 @@ describe('the loss of the device', () => {
     assertEqual(await opaque(await element.toBlob()), expected, 'pixels in the end');
   });
 
-  it('that comes with every first frame is an error too, not a loop', async () => {
+  itInLab('that comes with every first frame is an error too, not a loop', async () => {
     const original = GaussianSplatElement.sharedDevice;
     let requests = 0;
     GaussianSplatElement.sharedDevice = new SharedDevice(async () => {

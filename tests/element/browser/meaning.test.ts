@@ -1,6 +1,7 @@
 /** What a file says of itself, or cannot say: filter, up, and what of it is not drawn. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { someOf } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, frames, showLoaded, until } from './support/harness.js';
 import { isGreen, isRed, screenOf } from './support/screen.js';
 
@@ -41,7 +42,7 @@ describe('up, as the file says it', () => {
     ['Brush, an axis', ['Exported from Brush', 'Vertical axis: y'], [0, -1, 0]],
     ['a trainer that says nothing', [], [0, -1, 0]],
   ];
-  for (const [name, comments, up] of upright)
+  for (const [name, comments, up] of someOf(upright, 3))
     it(`stands upright without an attribute: ${name}`, async () => {
       const splats: Splat[] = [
         { at: up, colour: GREEN },
@@ -81,7 +82,7 @@ describe('the order of splats', () => {
     [['sorting_method pixel'], 'center', false],
     [[], 'pixel', true],
   ];
-  for (const [comments, order, isByPixel] of cases)
+  for (const [comments, order, isByPixel] of someOf(cases, 3))
     it(`${comments.join() || 'no comment'}, order ${order ?? 'not set'}: ${isByPixel ? 'by pixel' : 'by center'}`, async () => {
       const src = ply(crossing, comments);
       const element = await showLoaded({ src, ...(order && { order }) }, 'width: 120px; height: 120px');

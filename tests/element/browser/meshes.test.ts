@@ -2,7 +2,7 @@
 import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatMeshElement } from '@gaussian-splat/element/scenes.js';
-import { isLab } from '../../support/extent-in-pages.js';
+import { isLab, itInLab } from '../../support/extent-in-pages.js';
 import { boxGlb, type BoxOptions } from './support/glb.js';
 import { holdings } from './support/ledger.js';
 import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, until } from './support/harness.js';
@@ -76,7 +76,7 @@ describe('meshes', () => {
     assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METRE, 50)), 'turned to its edge');
   });
 
-  it('are in pictures of toBlob(), over a colour and over nothing, and hide splats there', async () => {
+  itInLab('are in pictures of toBlob(), over a colour and over nothing, and hide splats there', async () => {
     const element = place({ src: GREEN });
     element.append(mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' }));
     await element.ready;
@@ -102,7 +102,7 @@ describe('meshes', () => {
     assert(isRed(screen.at(60, 50)), 'and the frame on the page is as before');
   });
 
-  it('alone, without splats, and with a scene that comes later', async () => {
+  itInLab('alone, without splats, and with a scene that comes later', async () => {
     const element = place();
     element.append(mesh({ half: [1, 0.5, 0.5] }, { position: '0 1 0' }));
     await element.ready;
@@ -119,7 +119,7 @@ describe('meshes', () => {
     assertNear(await placeOf(element, isRed), [0, 1.2], 'the box', 0.4);
   });
 
-  it('move: by their own clock, or by that of the element', async () => {
+  itInLab('move: by their own clock, or by that of the element', async () => {
     const element = place({ src: COMPASS });
     const follower = mesh({ moves: 4, colour: [1, 0, 1], half: [0.3, 0.3, 0.3] }, { position: '-2 2 0' });
     element.append(follower);
@@ -138,7 +138,7 @@ describe('meshes', () => {
     follower.pause();
   });
 
-  it('of a file that has splats, too, are shown with them', async () => {
+  itInLab('of a file that has splats, too, are shown with them', async () => {
     const src = URL.createObjectURL(boxGlb({ splat: [2, 1, 0], half: [0.5, 0.5, 0.5] }));
     const element = place();
     const child = document.createElement('splat-scene');
@@ -160,7 +160,7 @@ describe('meshes', () => {
     assertNear(await placeOf(own, isGreen), [2, 1], 'splats', 0.3);
   });
 
-  it('are picked, and hide labels', async () => {
+  itInLab('are picked, and hide labels', async () => {
     const element = place({ src: GREEN });
     element.insertAdjacentHTML('beforeend', '<b slot="hotspot-ball" data-position="0 0 1.5">o</b>');
     const box = mesh({ half: [0.5, 0.5, 0.5] }, { position: '0 0 4' });

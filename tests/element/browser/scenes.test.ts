@@ -2,6 +2,7 @@
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatSceneElement } from '@gaussian-splat/element/scenes.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { holdings } from './support/ledger.js';
 import {
   assert,
@@ -80,7 +81,7 @@ describe('several scenes in one element', () => {
     assertEqual(alone.statistics?.splats, 6, 'splats');
   });
 
-  it('hide one another, whichever comes first', async () => {
+  itInLab('hide one another, whichever comes first', async () => {
     for (const [first, second] of [
       [`src="${COMPASS}"`, `src="${GREEN}" position="0 0 2m"`],
       [`src="${GREEN}" position="0 0 2m"`, `src="${COMPASS}"`],
@@ -220,7 +221,7 @@ describe('several scenes in one element', () => {
     assert(count((i) => data[i + 1] > 150 && data[i] < 100 && data[i + 3] > 100) > 0, 'green in the picture');
   });
 
-  it('come back after a lost device, each once, and go without a trace', async () => {
+  itInLab('come back after a lost device, each once, and go without a trace', async () => {
     const before = GaussianSplatElement.releaseDelay;
     GaussianSplatElement.releaseDelay = 0;
     try {
@@ -249,7 +250,7 @@ describe('several scenes in one element', () => {
     }
   });
 
-  it('have their own clocks, or follow that of the element', async () => {
+  itInLab('have their own clocks, or follow that of the element', async () => {
     const movie = '/net/sequence/movie.json';
     const element = await placeLoaded(`<gaussian-splat ${VIEW}>
       <splat-scene src="${movie}" position="-2 0 0"></splat-scene>

@@ -1,6 +1,7 @@
 /** Scene files that follow one another in time, with the words of HTMLMediaElement. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
+import { itInLab } from '../../support/extent-in-pages.js';
 import {
   assert,
   assertEqual,
@@ -128,7 +129,7 @@ describe('a sequence of files', () => {
     await frames(5);
   });
 
-  it('where every frame is late, in a second round too, pictures follow the clock at a distance', async () => {
+  itInLab('where every frame is late, in a second round too, pictures follow the clock at a distance', async () => {
     // Three seconds, of which two are looked ahead, and each frame takes longer than eight of them.
     const element = await showLoaded({ src: `${MOVIE}?count=72&fps=24&ms=350`, loop: '' });
     const seen = [new Set<number>(), new Set<number>()];
@@ -157,7 +158,7 @@ describe('a sequence of files', () => {
     assert(await shows(element, isGreen), 'the second frame');
   });
 
-  it('holds two seconds of frames in memory, whatever its length', async () => {
+  itInLab('holds two seconds of frames in memory, whatever its length', async () => {
     const element = await showLoaded({ src: `${MOVIE}?count=300&fps=10` });
     for (const seconds of [0, 5, 29, 12]) {
       await seek(element, seconds);

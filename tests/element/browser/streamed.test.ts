@@ -1,5 +1,6 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { MemoryLedger, USUAL_STEPS } from '@gaussian-splat/renderer';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
 import { storedBlocks } from '../../support/stored-blocks.js';
@@ -57,7 +58,7 @@ async function close(element: GaussianSplatElement): Promise<void> {
 }
 
 describe('a streamed scene', () => {
-  it('asks for its files with the query of its manifest', async () => {
+  itInLab('asks for its files with the query of its manifest', async () => {
     const loader = GaussianSplatElement.sceneLoader;
     const asked: string[] = [];
     await fetch('/net/kept/signed/detail.json', { method: 'PUT', body: JSON.stringify(folder.manifest) });
@@ -94,7 +95,7 @@ describe('a streamed scene', () => {
     stop();
   });
 
-  it('as a child asks for what the view needs of it where it stands', async () => {
+  itInLab('as a child asks for what the view needs of it where it stands', async () => {
     const { requests, stop } = await serve('/net/kept/child/');
     const element = show({ 'camera-orbit': '200deg 80deg 30m', 'camera-target': '5 0 0', loading: 'eager' });
     const child = document.createElement('splat-scene');
@@ -186,7 +187,7 @@ describe('a streamed scene', () => {
     stop();
   });
 
-  it("comes by way of the page's own thread where workers are refused", async () => {
+  itInLab("comes by way of the page's own thread where workers are refused", async () => {
     const original = GaussianSplatElement.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
     GaussianSplatElement.sceneLoader = new Loader(() => new Worker('/net/status/404', { type: 'module' }));
@@ -201,7 +202,7 @@ describe('a streamed scene', () => {
     await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .*workerLocation/);
   });
 
-  it('beside others makes do with less memory, and has a place', async () => {
+  itInLab('beside others makes do with less memory, and has a place', async () => {
     const { stop } = await serve('/net/kept/beside/');
     const src = '/net/kept/beside/detail.json';
     const first = show({ src, 'camera-orbit': '200deg 80deg 1m' });

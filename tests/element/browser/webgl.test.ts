@@ -2,6 +2,7 @@
 import '@gaussian-splat/element';
 import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement as ElementClass, type GaussianSplatElement } from '@gaussian-splat/element';
+import { itInLab } from '../../support/extent-in-pages.js';
 import {
   assert,
   assertEqual,
@@ -87,12 +88,12 @@ describe('renderer="webgl"', () => {
     await assertSame({ quality: 'reference', 'max-sh-degree': '1', src: '/demo/dist/scenes/skull.spz' });
   });
 
-  it('draws with the filter that the page names', async () => {
+  itInLab('draws with the filter that the page names', async () => {
     for (const filter of ['classic', 'antialiased', 'mip'])
       await assertSame({ filter, 'camera-orbit': '30deg 75deg 20m' });
   });
 
-  it('pictures of any size, over a colour, are those of WebGPU', async () => {
+  itInLab('pictures of any size, over a colour, are those of WebGPU', async () => {
     const options = { width: 333, height: 111, background: 'rgb(40 80 120)' };
     const taken = [];
     for (const renderer of ['webgl', 'webgpu']) {
@@ -112,7 +113,7 @@ describe('renderer="webgl"', () => {
     assert(found >= LEAST_DB, `${found.toFixed(1)} dB`);
   });
 
-  it('flights move its camera', async () => {
+  itInLab('flights move its camera', async () => {
     const element = await showLoaded(WEBGL);
     await element.flyTo({ orbit: '90deg 70deg 6m' }, { duration: 200 });
     assert(Math.abs(element.getCameraOrbit().theta - Math.PI / 2) < 1e-6, String(element.getCameraOrbit()));
@@ -120,7 +121,7 @@ describe('renderer="webgl"', () => {
     assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the picture');
   });
 
-  it('a picture that is read at once is of the camera of now', async () => {
+  itInLab('a picture that is read at once is of the camera of now', async () => {
     const element = await showLoaded(WEBGL);
     element.setAttribute('camera-orbit', '180deg 70deg 6m');
     element.jumpCameraToGoal();
@@ -143,7 +144,7 @@ describe('renderer="webgl"', () => {
     assertEqual(draws, before, 'frames of an idle page');
   });
 
-  it('picks the point under the pointer, hides hotspots that the scene hides', async () => {
+  itInLab('picks the point under the pointer, hides hotspots that the scene hides', async () => {
     document.body.style.margin = '0';
     const element = await showLoaded(WEBGL, 'width: 200px; height: 160px');
     const label = (name: string, position: string): HTMLElement => {
@@ -163,7 +164,7 @@ describe('renderer="webgl"', () => {
     assertEqual((await element.updateStats())?.drawn, element.statistics?.splats, 'splats drawn');
   });
 
-  it('follows its size, and another renderer', async () => {
+  itInLab('follows its size, and another renderer', async () => {
     const element = await showLoaded(WEBGL);
     element.style.width = '180px';
     await until(() => element.shadowRoot!.querySelector('canvas')!.width === 180, 'the new size');
@@ -190,7 +191,7 @@ describe('renderer="webgl"', () => {
     assertEqual(element.statistics?.renderer, 'webgl', 'renderer');
   });
 
-  it('many elements share one context, which is given back', async () => {
+  itInLab('many elements share one context, which is given back', async () => {
     const first = contexts.length;
     const elements = await Promise.all(Array.from({ length: 20 }, () => showLoaded({ ...WEBGL, loading: 'eager' })));
     const pictures = await Promise.all(elements.map(pixelsOf));
@@ -201,7 +202,7 @@ describe('renderer="webgl"', () => {
     await until(() => gl.isContextLost(), 'the end of the context');
   });
 
-  it('where the page refuses workers its own thread sorts', async () => {
+  itInLab('where the page refuses workers its own thread sorts', async () => {
     const original = ElementClass.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
     ElementClass.sceneLoader = new Loader(() => {

@@ -15,6 +15,7 @@ import {
   until,
 } from '../../element/browser/support/harness.js';
 import { screenOf } from '../../element/browser/support/screen.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { codeOf, FIXTURES, makeDevice, ReadingSink, RUNTIME } from './support.js';
 
 GaussianSplatElement.runtimeLocation = RUNTIME;
@@ -152,7 +153,7 @@ describe('a fault that the scene survives', () => {
     await alive;
   });
 
-  it('no Gaussian at all, and a count below zero: nothing is drawn, and more when there are more', async () => {
+  itInLab('no Gaussian at all, and a count below zero: nothing is drawn, and more when there are more', async () => {
     for (const share of ['0', '-0.5']) {
       const element = await showLoaded({ src: HALF, contract: halfContract(100, -1), 'control-share': share });
       assertEqual(await coverOf(element), 0, `pixels of share ${share}`);
@@ -182,7 +183,7 @@ describe('a fault that the scene survives', () => {
     assert(element.loaded && (await coverOf(element)) > 300, 'a picture');
   });
 
-  it('float16 without shader-f16: on the CPU, and said so', async () => {
+  itInLab('float16 without shader-f16: on the CPU, and said so', async () => {
     const element = show({ src: HALF });
     const fallback = nextEvent<CustomEvent<{ reason: string }>>(element, 'generator-fallback');
     await element.ready;
@@ -222,7 +223,7 @@ describe('a fault that the scene survives', () => {
     await seeked;
   });
 
-  it('a source that changes 1,000 times ends with the last', async () => {
+  itInLab('a source that changes 1,000 times ends with the last', async () => {
     const element = await showLoaded({ src: BALL });
     const sources = [`${FIXTURES}split.onnx`, BALL, COMPASS, `${FIXTURES}canonical.onnx`, '/net/html/x.onnx'];
     for (let i = 0; i < 1000; i++) {
@@ -239,7 +240,7 @@ describe('a fault that the scene survives', () => {
 });
 
 describe('faults of pages that use the generator by itself', () => {
-  it('generators that follow one another in a circle, or nobody', async () => {
+  itInLab('generators that follow one another in a circle, or nobody', async () => {
     const models = new GaussianModels();
     models.registerGaussianGenerator('body', { url: `${FIXTURES}link-fixed.onnx` }, { after: 'clothes' });
     models.registerGaussianGenerator('clothes', { url: `${FIXTURES}link-fixed.onnx` }, { after: 'body' });
@@ -288,7 +289,7 @@ describe('faults of pages that use the generator by itself', () => {
     other.destroy();
   });
 
-  it('a model that waits behind one that never ends is not blamed for it, and runs on the GPU', async () => {
+  itInLab('a model that waits behind one that never ends is not blamed for it, and runs on the GPU', async () => {
     setRuntimeLocation(RUNTIME);
     const [own, other] = [await makeDevice(), await makeDevice()];
     const told: string[] = [];

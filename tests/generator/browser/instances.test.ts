@@ -68,7 +68,7 @@ describe('instances of one generator', () => {
     };
   });
 
-  it('run together, and each writes what it would write alone', async () => {
+  itInLab('run together, and each writes what it would write alone', async () => {
     const single = await open('avatar');
     const alone = (single.sink = new NumberSink(device));
     const numbers = [0, 1, 2, 3, 4, 5];

@@ -15,6 +15,7 @@ import {
   hurry,
 } from '../../element/browser/support/harness.js';
 import { screenOf, type Rgb } from '../../element/browser/support/screen.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { calls, FIXTURES, RUNTIME } from './support.js';
 
 GaussianSplatElement.runtimeLocation = RUNTIME;
@@ -95,7 +96,7 @@ describe('a post-processor in the element', () => {
     );
   });
 
-  it('that is slow does not hold up the camera, and shows its picture when it rests', async () => {
+  itInLab('that is slow does not hold up the camera, and shows its picture when it rests', async () => {
     const element = await showLoaded(
       { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
       STYLE,
@@ -125,7 +126,7 @@ describe('a post-processor in the element', () => {
     assert(/control gaim: expected one of the inputs .*gain/.test(told[0].message), told[0].message);
   });
 
-  it('is that of the new size after the element has got one', async () => {
+  itInLab('is that of the new size after the element has got one', async () => {
     const element = await showLoaded({ src: COMPASS, 'control-gain': '0' }, STYLE);
     const plain = await lightOf(element);
     element.setAttribute('postprocess', `${FIXTURES}post.onnx`);
@@ -136,7 +137,7 @@ describe('a post-processor in the element', () => {
     await untilLight(element, (mean) => Math.abs(mean - before.mean) < 12, 'the processed picture, larger');
   });
 
-  it('that is slow keeps no picture of the sizes that pass meanwhile', async () => {
+  itInLab('that is slow keeps no picture of the sizes that pass meanwhile', async () => {
     const element = await showLoaded(
       { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
       STYLE,
@@ -214,7 +215,7 @@ describe('a post-processor in the element', () => {
 });
 
 describe('a chain in the element', () => {
-  it('is one scene, whose controls are those of all its models', async () => {
+  itInLab('is one scene, whose controls are those of all its models', async () => {
     const element = await showLoaded({ src: BALL, chain: `${FIXTURES}link-fixed.onnx` }, STYLE);
     const middle = async (): Promise<number> =>
       (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 700)?.y ?? NaN;
@@ -251,7 +252,7 @@ describe('a picture as a control', () => {
     return URL.createObjectURL(await canvas.convertToBlob());
   }
 
-  it('by URL, by image, by ImageBitmap; a wrong one is named and the last stays', async () => {
+  itInLab('by URL, by image, by ImageBitmap; a wrong one is named and the last stays', async () => {
     const url = await picture('red', 'blue');
     const errors: string[] = [];
     const element = await showLoaded({ src: `${FIXTURES}picture.onnx`, 'control-image': url }, STYLE);

@@ -2,6 +2,7 @@
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
 import { Generator, isRuntimeRequested, type GeneratorOptions, type ModelSource } from '@gaussian-splat/generator';
 import { assert, assertEqual, delay } from '../../element/browser/support/harness.js';
+import { itInLab, someOf } from '../../support/extent-in-pages.js';
 import {
   calls,
   CAMERA,
@@ -106,7 +107,7 @@ describe('generators', () => {
     assert(!isRuntimeRequested(), 'the runtime was asked for');
   });
 
-  for (const [name, kind, limit] of [
+  const named = [
     ['packed.onnx', 'captured', 1e-3],
     ['canonical.onnx', 'captured', 1e-3],
     ['split.onnx', 'captured', 1e-3],
@@ -114,7 +115,8 @@ describe('generators', () => {
     // Float16 without the device feature runs on the CPU.
     ['packed-sh-half.onnx', 'wasm', 5e-3],
     ['visionary-sh.onnx', 'wasm', 5e-3],
-  ] as const) {
+  ] as const;
+  for (const [name, kind, limit] of someOf<(typeof named)[number]>(named, 3)) {
     it(`${name} writes on the GPU what ONNX Runtime writes on the CPU`, async () => {
       const reasons: string[] = [];
       const generator = await open(name, { onFallback: (reason) => reasons.push(reason) });
@@ -150,7 +152,7 @@ describe('generators', () => {
     });
   }
 
-  it('are not recorded where a recording would lose what the runtime copies', async () => {
+  itInLab('are not recorded where a recording would lose what the runtime copies', async () => {
     const generator = await open('reshaped.onnx');
     const sink = (generator.sink = new ReadingSink(device));
     for (const [i, timeSeconds] of [0.3, 1.3, 2.1].entries()) {
@@ -164,17 +166,20 @@ describe('generators', () => {
     assertEqual(generator.kind, 'webgpu', 'kind');
   });
 
-  it('driven by whole numbers alone are not either: each frame is its own, and the last stays at the end', async () => {
-    const generator = await open('frames.onnx');
-    const sink = (generator.sink = new ReadingSink(device));
-    for (const [i, timeSeconds] of [0, 0.3, 0.5, 1].entries()) {
-      generator.request({ timeSeconds });
-      await generator.idle;
-      const { values } = (await runOnCpu(`${FIXTURES}frames.onnx`, { frame: i })).gaussians;
-      const found = numbersOf(await sink.runs[i].tensors.gaussians, 'float32');
-      assert(relativeError(found, values) < 1e-6, `frame ${i} at ${timeSeconds} s`);
-    }
-  });
+  itInLab(
+    'driven by whole numbers alone are not either: each frame is its own, and the last stays at the end',
+    async () => {
+      const generator = await open('frames.onnx');
+      const sink = (generator.sink = new ReadingSink(device));
+      for (const [i, timeSeconds] of [0, 0.3, 0.5, 1].entries()) {
+        generator.request({ timeSeconds });
+        await generator.idle;
+        const { values } = (await runOnCpu(`${FIXTURES}frames.onnx`, { frame: i })).gaussians;
+        const found = numbersOf(await sink.runs[i].tensors.gaussians, 'float32');
+        assert(relativeError(found, values) < 1e-6, `frame ${i} at ${timeSeconds} s`);
+      }
+    },
+  );
 
   it('draw what the CPU would have drawn: 55 dB and more', async () => {
     const generator = await open('packed.onnx');
@@ -274,27 +279,30 @@ describe('generators', () => {
     assertEqual(sink.runs.length, 3, 'runs of the other');
   });
 
-  it('whose runs fail again and again are back with values that they can take, and were never on the CPU', async () => {
-    const [errors, reasons]: [string[], string[]] = [[], []];
-    const options: GeneratorOptions = {
-      onError: (error) => errors.push((error as { code: string }).code),
-      onFallback: (reason) => reasons.push(reason),
-    };
-    const generator = await open('faulty-later.onnx', options);
-    const sink = (generator.sink = new ReadingSink(device));
-    for (const timeSeconds of [0.1, 2, 3, 4, 0.5]) {
-      generator.request({ timeSeconds });
-      await generator.idle;
-    }
-    assertEqual([errors, sink.runs.length], [['contract/run', 'contract/run', 'contract/run'], 2], 'errors, runs');
-    const later = await open('faulty-later.onnx', options);
-    const other = (later.sink = new ReadingSink(device));
-    later.request({ timeSeconds: 0.7 });
-    await later.idle;
-    assertEqual([errors.length, other.runs.length, reasons], [3, 1, []], 'errors, runs of the other, fallbacks');
-  });
+  itInLab(
+    'whose runs fail again and again are back with values that they can take, and were never on the CPU',
+    async () => {
+      const [errors, reasons]: [string[], string[]] = [[], []];
+      const options: GeneratorOptions = {
+        onError: (error) => errors.push((error as { code: string }).code),
+        onFallback: (reason) => reasons.push(reason),
+      };
+      const generator = await open('faulty-later.onnx', options);
+      const sink = (generator.sink = new ReadingSink(device));
+      for (const timeSeconds of [0.1, 2, 3, 4, 0.5]) {
+        generator.request({ timeSeconds });
+        await generator.idle;
+      }
+      assertEqual([errors, sink.runs.length], [['contract/run', 'contract/run', 'contract/run'], 2], 'errors, runs');
+      const later = await open('faulty-later.onnx', options);
+      const other = (later.sink = new ReadingSink(device));
+      later.request({ timeSeconds: 0.7 });
+      await later.idle;
+      assertEqual([errors.length, other.runs.length, reasons], [3, 1, []], 'errors, runs of the other, fallbacks');
+    },
+  );
 
-  it('that run nowhere say why to each who asks, and how often', async () => {
+  itInLab('that run nowhere say why to each who asks, and how often', async () => {
     const errors: unknown[] = [];
     for (let i = 0; i < 2; i++) {
       const bad = await open('faulty-run.onnx', { onError: (error) => errors.push(error) });
@@ -362,7 +370,7 @@ describe('generators', () => {
     await delay(50);
     assertEqual(sink.runs.length, 0, 'runs');
   });
-  it('that are closed while they start are not started to the end', async () => {
+  itInLab('that are closed while they start are not started to the end', async () => {
     // A start reads back what each of its runs wrote.
     const runsOf = async (query: string, closesEarly: boolean): Promise<number> => {
       const generator = await open(`packed.onnx?${query}`);
@@ -379,7 +387,7 @@ describe('generators', () => {
     assert(early < whole - 2, `${early} runs read back, of ${whole}`);
   });
 
-  it('closed, give back all memory of the GPU, that of a captured session too', async () => {
+  itInLab('closed, give back all memory of the GPU, that of a captured session too', async () => {
     const alive = new Set<GPUBuffer>();
     const { createBuffer } = GPUDevice.prototype;
     const { destroy } = GPUBuffer.prototype;
