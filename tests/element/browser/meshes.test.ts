@@ -1,12 +1,12 @@
 /** Triangle meshes among scenes: `<splat-mesh>` children, and glTF files that hold both. */
 import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import type { SplatMeshElement } from '@gaussian-splat/element/scenes.js';
+import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 import { isLab, itInLab } from '../../support/extent-in-pages.js';
 import { boxGlb, type BoxOptions } from './support/glb.js';
 import { holdings } from './support/ledger.js';
 import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, until } from './support/harness.js';
-import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
+import { comesToShow, isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
 
 const GREEN = `${FIXTURES}green.splat`;
 const VIEW = {
@@ -50,14 +50,14 @@ function assertNear(
 describe('meshes', () => {
   it('stand where their attributes say, and hide splats as these hide them', async () => {
     const element = place();
-    const ball = document.createElement('splat-scene');
+    const ball = document.createElement('splat-scene') as SplatSceneElement;
     ball.setAttribute('src', GREEN);
     ball.setAttribute('scale', '2');
     const behind = mesh({ colour: [0, 0, 1], half: [1, 1, 0.1] }, { position: '2 0 -3' });
     const before = mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' });
     element.append(ball, behind, before);
-    await element.ready;
-    assertEqual([behind.error?.message ?? null, behind.loaded, before.loaded], [null, true, true], 'loaded');
+    await until(() => ball.loaded && behind.loaded && before.loaded, `all three, with ${behind.error?.message ?? ''}`);
+    await comesToShow(element, (screen) => isGreen(screen.at(60 - 0.5 * METRE, 50)));
     const screen = await screenOf(element);
     const at = (x: number): Rgb => screen.at(60 + x * METRE, 50);
     assert(isRed(at(0)), `the near box hides the ball: ${at(0).join()}`);
