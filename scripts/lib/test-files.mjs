@@ -19,8 +19,12 @@ const LABORATORY = [
   /^tests\/generator\/browser\/(controls|examples\/|families|models|orbit|picture|post-unreachable|provider|scenes|shapes)/,
   // three.js beside the element; meshes draw with it in npm test.
   /^tests\/three\/browser\//,
-  // What `npm run release` makes.
-  /^tests\/packages\/release/,
+  // What the registry and `npm run release` are given.
+  /^tests\/packages\/(publish|release)/,
+  // Extremes of scenes and streams; npm test draws each kind of scene, setting and format against the oracle.
+  /^tests\/detail\/(ahead|at-rest|copies|quantized|runs)/,
+  /^tests\/golden\/(depth-key-bits|detail|harmonics-degree|haze|host|ingest-shapes|local-precision|rounded-apart|short-shaders|translation)/,
+  /^tests\/stability\/catalogue/,
   // Stages and WebGL are tested in Node and in the element; losses of the device in device.
   /^tests\/stages\/browser\//,
   /^tests\/stability\/browser\/(device-loss|gpu-crash|memory-budget|resize)/,
