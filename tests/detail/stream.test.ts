@@ -185,7 +185,7 @@ test('in a flight, with pages that come in any order and leave before they have 
   [renderer, scene, target].forEach((owner) => owner.destroy());
 });
 
-test('a view that turns to the scene lacks nothing, though hardly anything was visible for long', async () => {
+test('a view that turns to the scene lacks nothing, though hardly anything was visible for long', { skip: onlyInLab }, async () => {
   const device = await anyDevice();
   const places = Array.from({ length: 140 }, (_, k) => [9 * (k % 12), 0, 9 * Math.floor(k / 12)] as const);
   // The pool has room for more splats than are asked for.
