@@ -185,29 +185,33 @@ test('in a flight, with pages that come in any order and leave before they have 
   [renderer, scene, target].forEach((owner) => owner.destroy());
 });
 
-test('a view that turns to the scene lacks nothing, though hardly anything was visible for long', { skip: onlyInLab }, async () => {
-  const device = await anyDevice();
-  const places = Array.from({ length: 140 }, (_, k) => [9 * (k % 12), 0, 9 * Math.floor(k / 12)] as const);
-  // The pool has room for more splats than are asked for.
-  const scene = await openAll(detailFolder(pebbles(300), places));
-  // Whose room for pairs is watched, and that for splats with it.
-  const renderer = new Renderer(device, { ...options, rasterizer: 'tiles' });
-  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
-  const look = async (at: Vector3): Promise<void> => {
-    const camera = cameraAt([-200, -5, 50], at, { width: 96, height: 64, fovXDegrees: 60, near: 0.01 });
-    renderer.render({ gaussians: scene, camera, target, detail: 4, splatBudget: 150_000 });
-    await device.queue.onSubmittedWorkDone();
-  };
-  // Room is looked at every 16 frames.
-  for (let frame = 0; frame < 18; frame++) await look([-300, -5, 50]);
-  const away = await renderer.statistics();
-  await look([50, 0, 50]);
-  const towards = await renderer.statistics();
-  console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
-  assert.ok(scene.count > 1.5e5 && away.visible === 0 && towards.visible > 100);
-  assert.equal(towards.overflow + towards.pairOverflow, 0);
-  [renderer, scene, target].forEach((owner) => owner.destroy());
-});
+test(
+  'a view that turns to the scene lacks nothing, though hardly anything was visible for long',
+  { skip: onlyInLab },
+  async () => {
+    const device = await anyDevice();
+    const places = Array.from({ length: 140 }, (_, k) => [9 * (k % 12), 0, 9 * Math.floor(k / 12)] as const);
+    // The pool has room for more splats than are asked for.
+    const scene = await openAll(detailFolder(pebbles(300), places));
+    // Whose room for pairs is watched, and that for splats with it.
+    const renderer = new Renderer(device, { ...options, rasterizer: 'tiles' });
+    const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
+    const look = async (at: Vector3): Promise<void> => {
+      const camera = cameraAt([-200, -5, 50], at, { width: 96, height: 64, fovXDegrees: 60, near: 0.01 });
+      renderer.render({ gaussians: scene, camera, target, detail: 4, splatBudget: 150_000 });
+      await device.queue.onSubmittedWorkDone();
+    };
+    // Room is looked at every 16 frames.
+    for (let frame = 0; frame < 18; frame++) await look([-300, -5, 50]);
+    const away = await renderer.statistics();
+    await look([50, 0, 50]);
+    const towards = await renderer.statistics();
+    console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
+    assert.ok(scene.count > 1.5e5 && away.visible === 0 && towards.visible > 100);
+    assert.equal(towards.overflow + towards.pairOverflow, 0);
+    [renderer, scene, target].forEach((owner) => owner.destroy());
+  },
+);
 
 test('whatever is wished for, comes or fails, what is above a page is there, and no page twice', () => {
   const random = randomSource(5);
