@@ -174,7 +174,7 @@ describe('meshes', () => {
     assert(point && Math.abs(point.z - 4.5) < 0.02, `picked: ${point?.toString()}`);
   });
 
-  it('that cannot be read leave the others; a lost device brings them back; nothing stays behind', async () => {
+  itInLab('that cannot be read leave the others; a lost device brings them back; nothing stays behind', async () => {
     const before = GaussianSplatElement.releaseDelay;
     GaussianSplatElement.releaseDelay = 0;
     try {
