@@ -11,7 +11,7 @@ const CONTENT = Uint8Array.from({ length: 300_000 }, (_, i) => (i * i) >> 7);
 const OTHER = CONTENT.map((byte) => byte ^ 1);
 const BREAK = 100_000;
 /** Waiting is so many times as short here. */
-const HASTE = 60;
+const HASTE = 12;
 const MOST_BYTES = 2_000_000;
 
 type Answer = (response: ServerResponse, from: number, request: IncomingMessage) => void;
