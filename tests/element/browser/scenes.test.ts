@@ -16,7 +16,7 @@ import {
   submits,
   until,
 } from './support/harness.js';
-import { isBlue, isGreen, isRed, screenOf } from './support/screen.js';
+import { comesToShow, isBlue, isGreen, isRed, screenOf, type Screen } from './support/screen.js';
 
 const GREEN = `${FIXTURES}green.splat`;
 /** From 10 m on the z axis: a metre at the origin is 12.07 pixels. */
@@ -144,6 +144,8 @@ describe('several scenes in one element', () => {
     assert((await placeOf(element, isRed)) === null, 'removed');
     assert(await placeOf(element, isGreen), 'the own scene stays');
     element.prepend(child);
+    const isSeen = (screen: Screen): boolean => screen.middleOf(isRed) !== null;
+    await comesToShow(element, isSeen);
     await at(-2, 1, 'put back');
     const other = await placeLoaded(`<gaussian-splat src="${GREEN}" ${VIEW}></gaussian-splat>`);
     other.append(child);
@@ -151,7 +153,7 @@ describe('several scenes in one element', () => {
       () => (other as unknown as { stage: { composing?: unknown } }).stage.composing !== undefined,
       'its code',
     );
-    await delay(100);
+    await comesToShow(other, isSeen);
     assertNear(await placeOf(other, isRed), [-2, 1], 'in another element');
     assertEqual(loads, 0, 'further loads');
     child.src = GREEN;
