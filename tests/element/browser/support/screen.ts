@@ -46,7 +46,13 @@ export class Screen {
 export async function screenOf(element: Element): Promise<Screen> {
   await frames();
   const { x, y, width, height } = element.getBoundingClientRect();
-  const take = (): Promise<string> => executeServerCommand<string, object>('screenshot', { x, y, width, height });
+  // A page whose thread is busy for 20 s hears the answer after it has given up.
+  let tries = 10;
+  const take = (): Promise<string> =>
+    executeServerCommand<string, object>('screenshot', { x, y, width, height }).catch((error: unknown) => {
+      if (tries-- > 0) return 'later';
+      throw error;
+    });
   let png = await take();
   while (png === 'later') png = await take();
   const bytes = Uint8Array.from(atob(png), (c) => c.charCodeAt(0));
