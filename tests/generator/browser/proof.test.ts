@@ -12,7 +12,7 @@ before(async () => {
 beforeEach(() => localStorage.clear());
 
 const STATE = { timeSeconds: 1 };
-const until = async (isTrue: () => boolean, ms = 30_000): Promise<void> => {
+const until = async (isTrue: () => boolean, ms = 300_000): Promise<void> => {
   for (const end = performance.now() + ms; !isTrue() && performance.now() < end;)
     await new Promise((go) => setTimeout(go, 20));
 };
