@@ -28,7 +28,7 @@ const named = process.env.TEST_FILES?.split(' ').filter(Boolean);
 export default {
   reporters: [
     defaultReporter({ reportTestResults: true, reportTestProgress: process.stdout.isTTY }),
-    slowestReporter(60), { reportTestFileResults({ testFile, sessionsForTestFile }) { console.log(`DONE ${new Date().toTimeString().slice(0,8)} ${testFile} ${sessionsForTestFile.map((s) => s.passed).join()}`); } },
+    slowestReporter(),
     countReporter(),
   ],
   files: named ?? ['tests/**/browser/**/*.test.ts', `!${DENSE}`],
