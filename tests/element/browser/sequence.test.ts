@@ -149,7 +149,7 @@ describe('a sequence of files', () => {
     );
   });
 
-  it('a late frame leaves the last one on show, and is shown when it is there', async () => {
+  itInLab('a late frame leaves the last one on show, and is shown when it is there', async () => {
     const element = await showLoaded({ src: `${MOVIE}?ms=1200` });
     element.currentTime = 0.15;
     await delay(300);
@@ -363,7 +363,7 @@ describe('a source and a time in one task', () => {
 });
 
 describe('play()', () => {
-  it('loads a scene that waits for a click, or for somebody to see it', async () => {
+  itInLab('loads a scene that waits for a click, or for somebody to see it', async () => {
     const covered = show({ src: MOVIE, reveal: 'manual' });
     const below = show({ src: MOVIE }, 'width: 100px; height: 100px; margin-top: 5000px');
     await Promise.all([covered.play(), below.play()]);

@@ -2,6 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { emulateMedia, resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { violationsIn } from './support/axe.js';
 import { assert, assertEqual, claimFault, delay, frames, showLoaded, until } from './support/harness.js';
 
@@ -37,7 +38,7 @@ const code = (promise: Promise<unknown>): Promise<string> =>
 afterEach(() => resetMouse());
 
 describe('flyTo', () => {
-  it('goes there in its time, and fulfils on arrival', async () => {
+  itInLab('goes there in its time, and fulfils on arrival', async () => {
     const element = await scene();
     const seen: number[] = [];
     element.addEventListener('camera-change', () => seen.push(theta(element)));
@@ -172,7 +173,7 @@ describe('a list of views', () => {
     claimFault(/console\.warn: <gaussian-splat> views: .*expected a list of views/);
   });
 
-  it('is a path: by a share of it, and in time', async () => {
+  itInLab('is a path: by a share of it, and in time', async () => {
     const element = await scene({ views: VIEWS });
     await element.showAlong(0.5);
     near(theta(element), 90, 'in the middle is the second of three');
