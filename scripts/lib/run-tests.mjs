@@ -5,7 +5,7 @@ import { root, TSC } from './run.mjs';
 import { byGroup, byProcess } from './test-files.mjs';
 
 /** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
-const MOST_UNSTEADY = 6;
+const MOST_UNSTEADY = 3;
 const IN_ONE_PROCESS = 'tests/support/in-one-process.ts';
 const TYPES = [TSC, '--noEmit', '--project', 'tests'];
 const ESLINT = ['node_modules/eslint/bin/eslint.js', '.'];

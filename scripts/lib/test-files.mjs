@@ -22,8 +22,8 @@ const LABORATORY = [
   // What the registry and `npm run release` are given.
   /^tests\/packages\/(publish|release)/,
   // Extremes of scenes and streams; npm test draws each kind of scene, setting and format against the oracle.
-  /^tests\/detail\/(ahead|at-rest|copies|quantized|runs)/,
-  /^tests\/golden\/(depth-key-bits|detail|harmonics-degree|haze|host|ingest-shapes|local-precision|rounded-apart|short-shaders|translation)/,
+  /^tests\/detail\/(ahead|at-rest|quantized)/,
+  /^tests\/golden\/(depth-key-bits|detail|ingest-shapes|local-precision|rounded-apart|translation)/,
   /^tests\/stability\/catalogue/,
   // Stages and WebGL are tested in Node and in the element; losses of the device in device.
   /^tests\/stages\/browser\//,
