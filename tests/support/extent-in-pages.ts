@@ -1,4 +1,6 @@
 /** How much is tested in Chromium: see `extent.ts`. web-test-runner.config.mjs says it to the pages. */
+import { evenly } from './evenly.js';
+
 export const isFull = (globalThis as { STABILITY?: string }).STABILITY === 'full';
 
 /** Whether the laboratory's breadth is tested: `npm run test:lab`. */
@@ -15,6 +17,5 @@ export const sized = <T>(fast: T, full: T): T => (isFull ? full : fast);
  * @param count how many `npm test` keeps
  */
 export function someOf<T>(cases: readonly T[], count: number): readonly T[] {
-  if (isLab || cases.length <= count) return cases;
-  return Array.from({ length: count }, (_, k) => cases[Math.floor((k * cases.length) / count)]);
+  return isLab ? cases : evenly(cases, count);
 }

@@ -1,3 +1,5 @@
+import { evenly } from './evenly.js';
+
 /**
  * How much is tested. `npm test` keeps to what tells faults apart within its eight minutes on two cores; `npm run test:lab` adds what only repeats or widens, and `npm test -- --full` also runs what repeats the
  * same check on more views, formats and sizes.
@@ -15,8 +17,7 @@ export const isLab = isFull || process.env.TESTS === 'lab';
  * @param count how many `npm test` keeps
  */
 export function someOf<T>(cases: readonly T[], count: number): readonly T[] {
-  if (isLab || cases.length <= count) return cases;
-  return Array.from({ length: count }, (_, k) => cases[Math.floor((k * cases.length) / count)]);
+  return isLab ? cases : evenly(cases, count);
 }
 
 /** For the options of a test that the daily run leaves to the laboratory. */

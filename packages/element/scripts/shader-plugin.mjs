@@ -23,7 +23,8 @@ export const joinedIn = (text) => [...text.matchAll(JOINED)].map(([, pieces]) =>
 
 /** A plugin for Rollup. */
 export function shortShaders() {
-  let [files, short] = [[]];
+  let files = [];
+  let short;
   return {
     name: 'short-shaders',
     buildStart() {
