@@ -13,7 +13,7 @@ import { endNodeDevice } from '../support/node-device.js';
 interface Plugin {
   readonly piecesIn: (text: string) => Map<string, string>;
   readonly joinedIn: (text: string) => string[][];
-  shaderFiles(): readonly string[];
+  readonly SHADER_FILES: readonly string[];
   readonly shortShaders: () => {
     buildStart(): void;
     transform(code: string, id: string): { readonly code: string } | null;
@@ -29,7 +29,7 @@ interface Reflect {
   readonly WgslReflect: new (code: string) => Readonly<Record<'uniforms' | 'storage' | 'textures', Placed>>;
 }
 const scripts = '../../packages/element/scripts/';
-const { piecesIn, joinedIn, shaderFiles, shortShaders } = (await import(`${scripts}shader-plugin.mjs`)) as Plugin;
+const { piecesIn, joinedIn, SHADER_FILES, shortShaders } = (await import(`${scripts}shader-plugin.mjs`)) as Plugin;
 const { shortened } = (await import(`${scripts}short-wgsl.mjs`)) as {
   shortened: (pieces: Map<string, string>, joined: readonly (readonly string[])[]) => Map<string, string>;
 };
@@ -57,7 +57,7 @@ async function bothForms(): Promise<{ readable: Stage[]; short: Stage[] }> {
   const plugin = shortShaders();
   plugin.buildStart();
   const [readable, short]: [Stage[], Stage[]] = [[], []];
-  for (const file of shaderFiles()) {
+  for (const file of SHADER_FILES) {
     const { code } = plugin.transform(readFileSync(file, 'utf8'), file)!;
     const own = join(folder, basename(dirname(dirname(dirname(file)))));
     cpSync(dirname(file), own, { recursive: true });

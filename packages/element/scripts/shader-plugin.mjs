@@ -1,14 +1,20 @@
 /** Shortens the shaders in a bundle: see short-wgsl.mjs. The packages keep theirs readable, for whoever looks for a fault in one. */
-import { readdirSync, readFileSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { shortened } from './short-wgsl.mjs';
 
 const FOLDER = fileURLToPath(new URL('../../renderer/dist/generated/', import.meta.url));
 /** Where scripts/build-shaders.mjs and the compiler put the pieces that shaders are joined of. */
-export const shaderFiles = () =>
-  readdirSync(FOLDER)
-    .filter((file) => file.endsWith('shaders.js'))
-    .map((file) => FOLDER + file);
+export const SHADER_FILES = [
+  'shaders.js',
+  'live-shaders.js',
+  'streamed-shaders.js',
+  'quantized-shaders.js',
+  'probe-shaders.js',
+  'depth-shaders.js',
+  'linear-shaders.js',
+  'order-shaders.js',
+].map((file) => FOLDER + file);
 
 const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;
 
@@ -23,18 +29,16 @@ export const joinedIn = (text) => [...text.matchAll(JOINED)].map(([, pieces]) =>
 
 /** A plugin for Rollup. */
 export function shortShaders() {
-  let files = [];
   let short;
   return {
     name: 'short-shaders',
     buildStart() {
-      files = shaderFiles();
-      const texts = files.map((file) => readFileSync(file, 'utf8'));
+      const texts = SHADER_FILES.map((file) => readFileSync(file, 'utf8'));
       const pieces = new Map(texts.flatMap((text) => [...piecesIn(text)]));
       short = shortened(pieces, texts.flatMap(joinedIn));
     },
     transform(code, id) {
-      if (!files.includes(id)) return null;
+      if (!SHADER_FILES.includes(id)) return null;
       return {
         code: code.replace(PIECE, (_, before, name) => `${before}${JSON.stringify(short.get(name))};`),
         map: null,
