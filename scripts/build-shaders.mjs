@@ -14,6 +14,7 @@ const generatedOf = (name) => fileURLToPath(new URL(`../packages/${name}/src/gen
 
 /** Stages that few pages need, by the file that has them. */
 const RARE = {
+  'budget-shaders': ['detail_allow', 'detail_count'],
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],

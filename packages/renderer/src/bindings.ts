@@ -4,7 +4,7 @@ import type { PageTable } from './page-table.js';
 import type { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
 import { CullChunksStage, CullStage } from './stages/cull.js';
-import { DetailBudgetStage } from './stages/detail-budget.js';
+import type { DetailBudgetStage } from './stages/detail-budget.js';
 import { PlanStage } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
 import { SortStage } from './stages/sort.js';
@@ -12,7 +12,6 @@ import type { Variants } from './variants.js';
 
 /** The stages before the rasterizer; each is a shader of the same name. */
 export interface Stages {
-  readonly detailBudget: DetailBudgetStage;
   readonly cullChunks: CullChunksStage;
   readonly plan: PlanStage;
   readonly compact: CompactStage;
@@ -33,7 +32,6 @@ export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threa
   });
   const packed = readingStages();
   return {
-    detailBudget: new DetailBudgetStage(device),
     cullChunks: new CullChunksStage(device),
     plan: new PlanStage(device, threads),
     compact: new CompactStage(device),
@@ -45,7 +43,6 @@ export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threa
 /** Bind groups of one page. */
 interface PageBindings {
   readonly splatCount: number;
-  readonly detailCount: GPUBindGroup;
   /** Of a page of a streamed scene. */
   readonly wishes?: { readonly of: PageRequests; readonly note: GPUBindGroup };
   readonly reading: ReadingStages;
@@ -53,6 +50,13 @@ interface PageBindings {
   readonly cull: GPUBindGroup;
   readonly compact: GPUBindGroup;
   readonly project: GPUBindGroup;
+}
+
+/** What keeps a frame within a budget of splats, bound to the chunks of each page and to what they sum up to. */
+interface BudgetBindings {
+  readonly stage: DetailBudgetStage;
+  readonly count: readonly GPUBindGroup[];
+  readonly allow: GPUBindGroup;
 }
 
 /** What {@link FrameBindings} binds the stages to. */
@@ -64,7 +68,8 @@ export interface FrameBuffers {
 /** Everything that the stages before the rasterizer are bound to, for one page table and one capacity. */
 export class FrameBindings {
   readonly pages: readonly PageBindings[];
-  readonly detailAllow: GPUBindGroup;
+  /** With levels of detail. */
+  readonly budget: BudgetBindings | undefined;
   /** Of the survivors in the file's order. */
   readonly plan: GPUBindGroup;
   readonly #sorts = new Map<number, ReturnType<SortStage['bind']>>();
@@ -77,11 +82,7 @@ export class FrameBindings {
     this.table = table;
     this.scratch = scratch;
     this.pages = bindPages(stages, table, scratch);
-    this.detailAllow = stages.detailBudget.bindAllow({
-      view: table.view(0),
-      detail_counts: scratch.detailCounts,
-      chunk_shares: scratch.chunkShares,
-    });
+    this.budget = bindBudget(table, scratch);
     scratch.lay(table);
     this.plan = stages.plan.bind({
       limits: scratch.limits,
@@ -102,8 +103,24 @@ export class FrameBindings {
   }
 }
 
+function bindBudget(
+  table: PageTable,
+  { detailCounts: detail_counts, chunkShares }: Scratch,
+): BudgetBindings | undefined {
+  const stage = table.detailBudget;
+  return (
+    stage && {
+      stage,
+      count: table.pages.map(({ chunks, details = chunks }, i) =>
+        stage.bindCount({ view: table.view(i), chunks, details, detail_counts }),
+      ),
+      allow: stage.bindAllow({ view: table.view(0), detail_counts, chunk_shares: chunkShares }),
+    }
+  );
+}
+
 function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBindings[] {
-  const { chunkShares, detailCounts, visibleBits, groupOffsets, gathered, plan, splats, keys, order } = scratch;
+  const { chunkShares, visibleBits, groupOffsets, gathered, plan, splats, keys, order } = scratch;
   // The sort needs its first order buffer only after `project` has read the survivors from it.
   const survivors = order[0];
   return table.pages.map((page, i) => {
@@ -117,7 +134,6 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
     return {
       reading,
       splatCount: page.count,
-      detailCount: stages.detailBudget.bindCount({ view, chunks: page.chunks, details, detail_counts: detailCounts }),
       wishes: wishes && {
         of: wishes,
         note: wishes.bind({ view, chunks: page.chunks, details, chunk_shares: chunkShares }),

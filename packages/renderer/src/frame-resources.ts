@@ -164,7 +164,6 @@ export class FrameResources {
     const capacity = this.#capacity!;
     const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
     if (kept === undefined) this.#current?.scratch.destroy();
-    if (table.hasDetail) stages.detailBudget.prepare();
     const pages = table.pages.length;
     const { visible, pairs } = capacity;
     const spareBytes = this.#options.rasterizer.spareBytes({ capacity: visible, pairCapacity: pairs });

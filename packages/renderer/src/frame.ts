@@ -40,7 +40,7 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
   // What the last budget allowed.
   else if (frame.hasDetail) encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
-  if (frame.isBudgeted) keepWithinBudget(pass, frame);
+  if (frame.isBudgeted) keepWithinBudget(pass, bindings);
   cull(pass, frame);
   listSurvivors(pass, frame);
   for (const { reading, project, splatCount } of bindings.pages) {
@@ -56,11 +56,10 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
 }
 
 /** Finds the error on screen that leaves as many splats as the frame may look at. */
-function keepWithinBudget(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
-  for (const { detailCount, splatCount } of bindings.pages) {
-    stages.detailBudget.recordCount(pass, detailCount, splatCount);
-  }
-  stages.detailBudget.recordAllow(pass, bindings.detailAllow);
+function keepWithinBudget(pass: GPUComputePassEncoder, { pages, budget }: FrameBindings): void {
+  if (!budget) return;
+  pages.forEach(({ splatCount }, i) => budget.stage.recordCount(pass, budget.count[i], splatCount));
+  budget.stage.recordAllow(pass, budget.allow);
 }
 
 /** Streamed scenes that want to know now which pages the view asks for. */

@@ -1,4 +1,4 @@
-import type { ShDegree, Vector3 } from '@gaussian-splat/core';
+import { loadModule, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
@@ -9,6 +9,7 @@ import { DETAIL_NUMBERS } from './detail/chunk-detail.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
 import { shWords, type ShPrecision } from './pack/sh.js';
+import type { DetailBudgetStage } from './stages/detail-budget.js';
 
 export interface UploadOptions {
   /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
@@ -33,11 +34,14 @@ export class GaussianBuffers implements GaussianScene {
   readonly droppedCount: number;
   readonly pages: readonly GaussianPage[];
   readonly version = 0;
+  /** If there are levels of detail. */
+  readonly detailBudget: DetailBudgetStage | undefined;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
   readonly #contents: readonly Content[];
 
-  private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number) {
+  private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number, budget?: DetailBudgetStage) {
+    this.detailBudget = budget;
     ({
       count: this.count,
       shDegree: this.shDegree,
@@ -63,14 +67,17 @@ export class GaussianBuffers implements GaussianScene {
   /**
    * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for, and in portions that leave the thread time for other things.
    * @throws GaussianSplatError `out-of-memory/budget`, before anything is allocated, if the scene is larger than `memoryBudget` or than what the
-   * device's {@link MemoryLedger} has left for all scenes; `out-of-memory/allocation` if the device has no room.
+   * device's {@link MemoryLedger} has left for all scenes; `out-of-memory/allocation` if the device has no room; `network/unreachable` if the code for levels of detail
+   * cannot be loaded.
    */
   static async upload(
     device: GPUDevice,
     packed: PackedGaussians,
     { memoryBudget }: UploadOptions = {},
   ): Promise<GaussianBuffers> {
-    const made = await withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget));
+    const budget = packed.details && (await budgetOn(device));
+    const make = (): GaussianBuffers => new GaussianBuffers(device, packed, memoryBudget, budget);
+    const made = await withMemoryCheck(device, whatOf(packed), make);
     await writeInTurns(device, made.#contents);
     return made;
   }
@@ -85,6 +92,13 @@ export class GaussianBuffers implements GaussianScene {
     this.#memory.destroy();
   }
 }
+
+/** Few scenes have levels of detail. */
+const budgetOn = (device: GPUDevice): Promise<DetailBudgetStage> =>
+  loadModule('the code for budgets of splats', async () => {
+    const { DetailBudgetStage } = await import('./stages/detail-budget.js');
+    return new DetailBudgetStage(device);
+  });
 
 const whatOf = ({ count }: PackedGaussians): string => `scene of ${count} splats`;
 

@@ -3,6 +3,7 @@ import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
 import type { RenderSettings } from './render-settings.js';
 import type { ShPrecision } from './pack/sh.js';
+import type { DetailBudgetStage } from './stages/detail-budget.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
 export interface GaussianPage {
@@ -53,6 +54,8 @@ export interface GaussianScene {
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
+  /** Of a scene with levels of detail: what keeps its frames within `RenderSettings.splatBudget`. Such scenes bring it, so that no other page loads it. */
+  readonly detailBudget?: DetailBudgetStage | undefined;
   /** Of a scene that is streamed: where views record the pages that they need. */
   readonly pageRequests?: PageRequests;
   /** Called before each frame: a streamed scene uploads what has come. */

@@ -7,6 +7,7 @@ import { writeStruct } from './gpu/struct.js';
 import type { RenderSettings } from './render-settings.js';
 import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
+import type { DetailBudgetStage } from './stages/detail-budget.js';
 import { cameraValues, MAX_FLOAT32 } from './view.js';
 import type { Placement, World } from './world.js';
 
@@ -83,6 +84,11 @@ export class PageTable {
   /** Lets streamed scenes take in what has come. */
   update(): void {
     for (const { scene } of this.#placements) scene.update?.();
+  }
+
+  /** What keeps frames within a budget of splats; undefined without levels of detail. */
+  get detailBudget(): DetailBudgetStage | undefined {
+    return this.#placements.find(({ scene }) => scene.detailBudget)?.scene.detailBudget;
   }
 
   /** True if a page has levels of detail. */

@@ -260,7 +260,7 @@ export class UncheckedViewpoint {
       levers,
       keepsSurvivors: auxiliary !== undefined,
       hasDetail: table.hasDetail,
-      isBudgeted: levers.splatBudget > 0 && table.hasDetail,
+      isBudgeted: levers.splatBudget > 0 && table.detailBudget !== undefined,
       order,
       keepsDepths: depth !== undefined && !order,
       timer,

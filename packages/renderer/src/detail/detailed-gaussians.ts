@@ -5,6 +5,7 @@ import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import type { ShPrecision } from '../pack/sh.js';
+import type { DetailBudgetStage } from '../stages/detail-budget.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
 import type { PackedLevels } from './packed-levels.js';
 
@@ -65,6 +66,10 @@ export class DetailedGaussians implements GaussianScene {
       own.destroy();
       throw error;
     }
+  }
+
+  get detailBudget(): DetailBudgetStage | undefined {
+    return this.#coarser.detailBudget;
   }
 
   get version(): number {

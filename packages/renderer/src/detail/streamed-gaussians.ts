@@ -4,6 +4,7 @@ import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 import type { ShPrecision } from '../pack/sh.js';
+import { DetailBudgetStage } from '../stages/detail-budget.js';
 import { ARRIVAL_MS, Arrivals } from './arrivals.js';
 import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
 import { NONE } from './page-list.js';
@@ -88,6 +89,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly pages: readonly GaussianPage[];
+  readonly detailBudget: DetailBudgetStage;
   /** Page requests of the views: for the renderer. */
   readonly pageRequests: WishReader;
   readonly #source: PageSource;
@@ -118,6 +120,7 @@ export class StreamedGaussians implements GaussianScene {
       origin,
     ];
     this.bounds = bounds;
+    this.detailBudget = new DetailBudgetStage(device);
     this.leafCount = scene.splats;
     this.#source = source;
     this.#options = options;

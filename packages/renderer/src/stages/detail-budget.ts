@@ -1,5 +1,6 @@
-import { constants, detailAllow, detailCount } from '../generated/shaders.js';
-import { rareKernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import { detailAllow, detailCount } from '../generated/budget-shaders.js';
+import { constants } from '../generated/shaders.js';
+import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import { cullGroups } from './cull.js';
 
 /** How far chunks may be off on screen so that a frame looks at no more splats than it may. */
@@ -8,14 +9,8 @@ export class DetailBudgetStage {
   readonly #allow: ComputeKernel<typeof detailAllow>;
 
   constructor(device: GPUDevice) {
-    this.#count = rareKernelOf(device, detailCount);
-    this.#allow = rareKernelOf(device, detailAllow);
-  }
-
-  /** Of a scene with levels of detail: makes the pipelines. */
-  prepare(): void {
-    this.#count.prepare();
-    this.#allow.prepare();
+    this.#count = kernelOf(device, detailCount);
+    this.#allow = kernelOf(device, detailAllow);
   }
 
   bindCount(resources: Resources<typeof detailCount>): GPUBindGroup {
