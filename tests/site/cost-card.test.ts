@@ -90,7 +90,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
     );
     assert.deepEqual(reasons, ['webgl', 'unsupported/no-webgpu', 'unsupported/no-webgpu']);
     assert.ok(await tab.locator('#plain p').getByText('This 3D scene needs WebGPU').isVisible());
-    assert.ok(await tab.locator('figure[slot=fallback]').getByText('A picture of the scene').isVisible());
+    assert.ok(await tab.locator('figure[slot=fallback]').getByText('An image of the scene').isVisible());
     await checkPage({ tab, faults });
     await tab.close();
   });

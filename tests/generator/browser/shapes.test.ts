@@ -116,6 +116,39 @@ describe('what models take, told to the page', () => {
     await until(() => part('controls-panel')!.hidden === true, 'no panel');
   });
 
+  it('a panel shows what the page sets, and turns the pose that there is', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}state.onnx`, 'controls-panel': '', 'control-push': '0.5' });
+    const fields = (): HTMLInputElement[] => [
+      ...element.shadowRoot!.querySelectorAll<HTMLInputElement>('input[part=control-input]'),
+    ];
+    const shows = (values: string[], at: number): Promise<void> =>
+      until(
+        () =>
+          String(
+            fields()
+              .map(({ value }) => Number(value).toFixed(1))
+              .slice(at),
+          ) === String(values),
+        `${String(values)} in the panel`,
+      );
+    await shows(['0.5'], 1);
+    element.setAttribute('control-push', '1');
+    await shows(['1.0'], 1);
+    element.controls = { push: 0.25 };
+    await shows(['0.3'], 1);
+    // Two joints as matrices: the first turned around z, by an attribute.
+    element.setAttribute('pose', '0 -1 0 1 0 0 0 0 1 1 0 0 0 1 0 0 0 1');
+    element.src = `${FIXTURES}shaped.onnx`;
+    await shows(['0.0', '0.0', '1.6'], -3);
+    const [, y] = fields().slice(-3);
+    y.value = '0';
+    y.dispatchEvent(new Event('input'));
+    const pose = element.pose as readonly number[];
+    assert(Math.abs(pose[0]) < 0.02 && Math.abs(pose[1] + 1) < 0.02, `still turned: ${pose.slice(0, 9).join(' ')}`);
+    element.pose = null;
+    await shows(['0.0', '0.0', '0.0'], -3);
+  });
+
   it('the same of a generator in a child: its own inputs, and a group of the panel', async () => {
     const element = await showLoaded({ src: COMPASS, 'controls-panel': '' });
     const child = document.createElement('splat-scene') as SplatSceneElement;

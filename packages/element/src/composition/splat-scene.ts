@@ -70,6 +70,7 @@ export class SplatSceneElement extends SplatChild {
     // Names of controls are the model's: no list of observed attributes can hold them.
     this.#observer ??= new MutationObserver((records) => {
       if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
+      this.requestUpdate();
       this.#liveValues = undefined;
       this.holder.requestFrame();
     });

@@ -1,7 +1,8 @@
 /** Loaded only for the attribute `controls-panel`, and where a model takes anything. */
+import type { ReactiveElement } from 'lit';
 import { readSpokenStrings, type SpokenStrings } from '../words.js';
 import type { GeneratorInput } from './inputs.js';
-import { poseOf } from './pose-of.js';
+import { poseOf, turnsOf } from './pose-of.js';
 import { readNumbers, valueOf, type ControlValues, type Numbers } from './values.js';
 
 /** What the panel says, in English. The keys are those of `a11y`, too. */
@@ -44,7 +45,7 @@ const STYLE = `
 `;
 
 /** Whose inputs are set: the element, or a `<splat-scene>` in it. */
-interface Owner extends HTMLElement {
+interface Owner extends HTMLElement, Pick<ReactiveElement, 'addController'> {
   readonly inputs: readonly GeneratorInput[];
   controls: ControlValues | null;
   pose: Numbers | null;
@@ -67,6 +68,10 @@ export class ControlsPanel {
   readonly #box: HTMLElement;
   /** Those with rotations of joints, which people turn as axis-angle. */
   readonly #turned = new Set<Owner>();
+  /** Those whose values it follows. */
+  readonly #followed = new WeakSet<Owner>();
+  /** Each shows the value that its control has by now. */
+  #followers: (() => void)[] = [];
   #told = '';
 
   private constructor(element: PanelHost) {
@@ -79,7 +84,7 @@ export class ControlsPanel {
     root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
     root.append(this.#box);
     element.addEventListener('inputs-change', () => this.#update());
-    element.addEventListener('timeupdate', () => this.#showTime());
+    element.addEventListener('timeupdate', () => this.#follow());
     element.addEventListener('emptied', () => this.#update());
     new MutationObserver(() => this.#update()).observe(element, { attributeFilter: ['controls-panel'] });
   }
@@ -99,6 +104,12 @@ export class ControlsPanel {
     if (told === this.#told || this.#box.hidden) return;
     this.#told = told;
     this.#turned.clear();
+    this.#followers = [];
+    for (const owner of owners) {
+      // What a page sets is shown, too.
+      if (!this.#followed.has(owner)) owner.addController({ hostUpdated: () => this.#follow() });
+      this.#followed.add(owner);
+    }
     const controls = owners.flatMap((owner) => {
       const own = owner.inputs.flatMap((input) => this.#controlsOf(owner, input));
       return owner === this.#element || own.length === 0 ? own : [this.#group(owner, own)];
@@ -116,6 +127,17 @@ export class ControlsPanel {
     details.append(summary, ...controls, reset);
     this.#box.replaceChildren(details);
     this.#box.hidden = controls.length === 0;
+  }
+
+  #follow(): void {
+    for (const follow of this.#followers) follow();
+  }
+
+  /** A slider that shows a value which others may set, too. */
+  #slider(...[title, range, step, now, onValue]: Parameters<typeof slider>): HTMLElement {
+    const control = slider(title, range, step, now, onValue);
+    this.#followers.push(() => showValue(control, now()));
+    return control;
   }
 
   /** The element and its children, as far as they have inputs. */
@@ -149,9 +171,10 @@ export class ControlsPanel {
     return Array.from({ length: Math.min(size, MOST_SLIDERS) }, (_, i) => {
       const title = names?.[i] ?? (size > 1 ? `${label} ${i + 1}` : label);
       const now = (): readonly number[] => valuesOf(owner, name) ?? initial;
-      return slider(title, range, step, now()[i] ?? now()[0], (value) => {
-        const values = Array.from({ length: size }, (__, k) => now()[k] ?? now()[0]);
-        values[i] = value;
+      const valueAt = (k: number): number => now()[k] ?? now()[0];
+      const own = (): number => valueAt(i);
+      return this.#slider(title, range, step, own, (value) => {
+        const values = Array.from({ length: size }, (__, k) => (k === i ? value : valueAt(k)));
         set(owner, name, values);
       });
     });
@@ -172,7 +195,15 @@ export class ControlsPanel {
     const perJoint = { 'axis-angle': 3, quaternion: 4, matrix: 9, parameters: 0 }[format];
     if (perJoint === 0) return [];
     const count = size / perJoint;
-    const turns = new Array<number>(3 * count).fill(0);
+    const none = new Array<number>(3 * count).fill(0);
+    let [turns, posed]: [number[], Numbers | null | undefined] = [[...none], undefined];
+    /** As the page has set them, or as they were turned here: whole turns do not come back from a pose. */
+    const read = (): number[] => {
+      if (owner.pose === posed) return turns;
+      posed = owner.pose;
+      const numbers = readNumbers(posed);
+      return (turns = numbers?.length === size ? turnsOf(numbers, input) : [...none]);
+    };
     this.#turned.add(owner);
     const choice = make('select', { part: 'control-input' });
     choice.append(
@@ -180,30 +211,30 @@ export class ControlsPanel {
         make('option', { value: String(i), textContent: joints?.[i] ?? `${this.#word('controls-joint')} ${i + 1}` }),
       ),
     );
-    const axes = ['x', 'y', 'z'].map((axis, k) =>
-      slider(axis, [-Math.PI, Math.PI], Math.PI / SLIDER_STEPS, 0, (value) => {
-        turns[3 * Number(choice.value) + k] = value;
-        owner.pose = poseOf(turns, input);
-      }),
-    );
-    choice.addEventListener('change', () =>
-      axes.forEach((axis, k) => showValue(axis, turns[3 * Number(choice.value) + k])),
-    );
+    const axes = ['x', 'y', 'z'].map((axis, k) => {
+      const place = (): number => 3 * Number(choice.value) + k;
+      return this.#slider(
+        axis,
+        [-Math.PI, Math.PI],
+        Math.PI / SLIDER_STEPS,
+        () => read()[place()],
+        (value) => {
+          read()[place()] = value;
+          owner.pose = posed = poseOf(turns, input);
+        },
+      );
+    });
+    choice.addEventListener('change', () => this.#follow());
     return [labelled(this.#word('controls-joint'), choice), ...axes];
   }
 
   #time(): HTMLElement {
-    const { duration, currentTime } = this.#element;
-    const control = slider(this.#word('controls-time'), [0, duration], duration / 1000, currentTime, (value) => {
-      this.#element.currentTime = value;
+    const element = this.#element;
+    const { duration } = element;
+    const now = (): number => element.currentTime;
+    return this.#slider(this.#word('controls-time'), [0, duration], duration / 1000, now, (value) => {
+      element.currentTime = value;
     });
-    control.dataset.of = 'time';
-    return control;
-  }
-
-  #showTime(): void {
-    const control = this.#box.querySelector<HTMLElement>('[data-of=time]');
-    if (control) showValue(control, this.#element.currentTime);
   }
 
   #reset(): void {
@@ -241,7 +272,7 @@ function slider(
   title: string,
   [min, max]: readonly [min: number, max: number],
   step: number,
-  value: number,
+  now: () => number,
   onValue: (value: number) => void,
 ): HTMLElement {
   const field = make('input', { type: 'range', part: 'control-input' });
@@ -250,10 +281,12 @@ function slider(
   const shown = make('span', { part: 'control-value', ariaHidden: 'true' });
   const control = labelled(title, field, shown);
   field.addEventListener('input', () => {
-    shown.textContent = short(field.valueAsNumber);
-    onValue(field.valueAsNumber);
+    const value = field.valueAsNumber;
+    shown.textContent = short(value);
+    // Steps that begin at a fraction miss zero by their rounding.
+    onValue(Math.abs(value) < step / 1e6 ? 0 : value);
   });
-  showValue(control, value);
+  showValue(control, now());
   return control;
 }
 
@@ -269,7 +302,7 @@ function labelled(title: string, ...fields: HTMLElement[]): HTMLElement {
   return control;
 }
 
-const short = (value: number): string => String(Number(value.toPrecision(3)));
+const short = (value: number): string => String(Number((Math.abs(value) < 1e-6 ? 0 : value).toPrecision(3)));
 
 function make<K extends keyof HTMLElementTagNameMap>(
   tag: K,

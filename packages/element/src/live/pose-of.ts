@@ -16,6 +16,34 @@ export function poseOf(
   }).flat();
 }
 
+/** The other way: axis-angle of no more than half a turn, of a pose as an input takes it. Quaternions and matrices may be of any size. */
+export function turnsOf(
+  pose: readonly number[],
+  { format, quaternionOrder }: Pick<GeneratorInput, 'format' | 'quaternionOrder'>,
+): number[] {
+  if (format === 'axis-angle') return [...pose];
+  const numbers = format === 'matrix' ? 9 : 4;
+  return Array.from({ length: pose.length / numbers }, (_, joint) => {
+    const own = pose.slice(numbers * joint, numbers * (joint + 1));
+    const [w, ...axis] =
+      format === 'matrix' ? quaternionOf(own) : quaternionOrder === 'xyzw' ? [own[3], ...own.slice(0, 3)] : own;
+    const length = Math.hypot(...axis);
+    const share = length > 0 ? (2 * Math.atan2(Math.sign(w || 1) * length, Math.abs(w))) / length : 0;
+    return axis.map((part) => part * share);
+  }).flat();
+}
+
+/** w x y z of a rotation, row-major: of the four ways to find it the one that divides by most. */
+function quaternionOf([a, b, c, d, e, f, g, h, i]: readonly number[]): number[] {
+  const ways = [
+    [1 + a + e + i, h - f, c - g, d - b],
+    [h - f, 1 + a - e - i, b + d, c + g],
+    [c - g, b + d, 1 - a + e - i, f + h],
+    [d - b, c + g, f + h, 1 - a - e + i],
+  ];
+  return ways.reduce((best, way, k) => (way[k] > best[ways.indexOf(best)] ? way : best));
+}
+
 /** Row-major. */
 function matrixOf([w, x, y, z]: readonly number[]): number[] {
   return [
