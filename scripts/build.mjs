@@ -7,7 +7,7 @@ import { copyFileSync, existsSync, readdirSync, readFileSync, rmSync, writeFileS
 import { join } from 'node:path';
 import { writeAttributeRows } from '../packages/element/scripts/attributes.mjs';
 import { writeIntegrity } from '../packages/element/scripts/integrity.mjs';
-import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
+import { beginBuild, ensureDependencies } from './lib/prepare.mjs';
 import { must, mustSoon, root, TSC } from './lib/run.mjs';
 
 /** Scripts of pages, each beside its page. */
@@ -28,6 +28,7 @@ const RUNTIME_LICENCES = 'packages/element/third-party/onnxruntime';
 
 const extent = ['element', 'packages'].find((name) => process.argv.includes(`--${name}`)) ?? 'whole';
 
+const noteBuilt = beginBuild(extent);
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, [TSC, '--build', ...projects()]);
@@ -40,7 +41,7 @@ if (extent !== 'packages') {
   if (extent === 'whole') await buildApps();
   if (extent === 'whole') await buildPages();
 }
-noteBuilt(extent);
+noteBuilt();
 
 /** The CDN bundle, which takes longest. */
 async function bundleElement() {

@@ -17,7 +17,14 @@ export function ensureDependencies() {
 }
 
 /** What the two builds are made from, and where they note that they are done. */
-const WHOLE = { stamp: '.cache/built', sources: ['shaders', 'packages', 'demo', 'docs', 'scripts', 'package.json'] };
+const WHOLE = {
+  stamp: '.cache/built',
+  sources: [
+    ...['shaders', 'packages', 'demo', 'docs', 'scripts', 'package.json'],
+    // Documents that the site shows.
+    ...['README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'SECURITY.md', 'LICENSE'],
+  ],
+};
 const ELEMENT = {
   stamp: '.cache/built-element',
   sources: ['shaders', 'packages', 'scripts/build.mjs', 'package.json'],
@@ -31,7 +38,7 @@ const PACKAGES = {
 
 /** Builds everything unless nothing changed since the last build. */
 export function ensureBuilt() {
-  if (!isBuilt({ ...WHOLE, sources: [...WHOLE.sources, ...AT_ROOT] })) build();
+  if (!isBuilt(WHOLE)) build();
 }
 
 /** Builds the element alone, which takes half of the time, unless nothing changed since it was built. */
@@ -51,28 +58,35 @@ export function build() {
 
 const STAMPS = { whole: [PACKAGES, WHOLE, ELEMENT], element: [ELEMENT], packages: [PACKAGES] };
 
-/** Notes that a build is done: `whole` holds the other two. */
-export function noteBuilt(extent) {
-  mkdirSync(join(root, '.cache'), { recursive: true });
-  for (const { stamp } of STAMPS[extent]) writeFileSync(join(root, stamp), '');
+/** Begins a build. The result notes that it is done (`whole` holds the other two), from the sources as they were: what is edited meanwhile asks for another. */
+export function beginBuild(extent) {
+  const before = STAMPS[extent].map(({ stamp, sources }) => [join(root, stamp), fingerprint(sources)]);
+  return () => {
+    mkdirSync(join(root, '.cache'), { recursive: true });
+    for (const [path, state] of before) writeFileSync(path, state);
+  };
 }
 
 function isBuilt({ stamp, sources }) {
   const path = join(root, stamp);
   const made = stamp === PACKAGES.stamp ? 'packages/three/dist/index.js' : 'packages/element/cdn/gaussian-splat.min.js';
-  if (!existsSync(path) || !existsSync(join(root, made))) return false;
-  return statSync(path).mtimeMs >= Math.max(...sources.map(newestChange));
+  return existsSync(path) && existsSync(join(root, made)) && readFileSync(path, 'utf8') === fingerprint(sources);
 }
 
-/** Documents that the site shows. */
-const AT_ROOT = ['README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'SECURITY.md', 'LICENSE'];
-const IGNORED = new Set(['node_modules', 'dist', 'cdn', 'generated']);
+/** What builds write among the sources. */
+const IGNORED = new Set([
+  ...['node_modules', 'dist', 'cdn', 'generated', 'LICENSE'],
+  ...['custom-elements.json', 'vscode.html-custom-data.json', 'web-types.json'],
+]);
 
-/** Latest modification time under a path, in milliseconds. */
-function newestChange(path) {
-  const absolute = join(root, path);
-  const status = statSync(absolute);
-  if (!status.isDirectory()) return status.mtimeMs;
-  const children = readdirSync(absolute).filter((name) => !IGNORED.has(name) && !name.endsWith('.tsbuildinfo'));
-  return Math.max(status.mtimeMs, ...children.map((name) => newestChange(join(path, name))));
+/** Of all files under some paths, with the times when they were changed. */
+function fingerprint(paths) {
+  return createHash('sha256').update(paths.flatMap(changesUnder).join('\n')).digest('hex');
+}
+
+function changesUnder(path) {
+  const status = statSync(join(root, path));
+  if (!status.isDirectory()) return [`${path} ${status.mtimeMs}`];
+  const children = readdirSync(join(root, path)).filter((name) => !IGNORED.has(name) && !name.endsWith('.tsbuildinfo'));
+  return children.flatMap((name) => changesUnder(`${path}/${name}`));
 }

@@ -149,13 +149,18 @@ export const upGrammar: AttributeGrammar<Vector3 | undefined> = {
   parse: (text) => (text.trim() === 'auto' ? undefined : parseUp(text)),
 };
 
-/** A number within a range, such as `interpolation-decay` (milliseconds) and `max-pixel-ratio`. */
-export const numberGrammar = (fallback: number, min: number, expected: string): AttributeGrammar<number> => ({
+/** A number from `min` to `max`, such as `interpolation-decay` (milliseconds) and `max-pixel-ratio`. */
+export const numberGrammar = (
+  fallback: number,
+  min: number,
+  expected: string,
+  max = Infinity,
+): AttributeGrammar<number> => ({
   expected,
   fallback: String(fallback),
   parse: (text) => {
     const value = text.trim() === '' ? NaN : Number(text);
-    return value >= min ? value : null;
+    return value >= min && value <= max ? value : null;
   },
 });
 

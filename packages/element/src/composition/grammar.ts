@@ -1,6 +1,6 @@
 /** Grammar of the attributes that place a child: see ../camera/grammar.ts. */
 import type { Vector3 } from '@gaussian-splat/core';
-import { angleGrammar, parsePoint, type AttributeGrammar } from '../camera/grammar.js';
+import { angleGrammar, numberGrammar, parsePoint, type AttributeGrammar } from '../camera/grammar.js';
 
 const terms = (text: string): string[] => text.trim().split(/\s+/);
 
@@ -36,14 +36,7 @@ export const scaleGrammar: AttributeGrammar<Vector3> = {
 };
 
 /** `opacity`. */
-export const opacityGrammar: AttributeGrammar<number> = {
-  expected: 'a number from 0 to 1',
-  fallback: '1',
-  parse: (text) => {
-    const value = text.trim() === '' ? NaN : Number(text);
-    return value >= 0 && value <= 1 ? value : null;
-  },
-};
+export const opacityGrammar = numberGrammar(1, 0, 'a number from 0 to 1', 1);
 
 /** `crop`: two corners; undefined for all. */
 export const boxGrammar: AttributeGrammar<readonly number[] | undefined> = {
