@@ -243,7 +243,7 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
   );
   await tab.route('**/sequence.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
   await tab.route('**/style.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/post-fixed.onnx') }));
-  await tab.route('**/walker.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/packed.onnx') }));
+  await tab.route(/\/(walker|ball)\.onnx$/, (route) => route.fulfill({ body: fixture('fixtures/generators/packed.onnx') })); // prettier-ignore
 }
 
 /** All of them on one page, each in a frame of its own document would be a device each: here they share one, as on any page. */
