@@ -129,21 +129,32 @@ fn put_in_order(near: ptr<function, Four>, far: ptr<function, Four>) {
   *far = Four(max(a.key, b.key), select(b.color, a.color, swaps));
 }
 
-// Each four that first grows and then shrinks, or the other way, becomes one in order.
-fn straighten(p: ptr<function, Four>, q: ptr<function, Four>) {
-  var a = Four(vec4u((*p).key.xy, (*q).key.xy), vec4u((*p).color.xy, (*q).color.xy));
-  var b = Four(vec4u((*p).key.zw, (*q).key.zw), vec4u((*p).color.zw, (*q).color.zw));
-  put_in_order(&a, &b);
-  var c = Four(vec4u(a.key.x, b.key.x, a.key.z, b.key.z), vec4u(a.color.x, b.color.x, a.color.z, b.color.z));
-  var d = Four(vec4u(a.key.y, b.key.y, a.key.w, b.key.w), vec4u(a.color.y, b.color.y, a.color.w, b.color.w));
-  put_in_order(&c, &d);
-  *p = Four(vec4u(c.key.x, d.key.x, c.key.y, d.key.y), vec4u(c.color.x, d.color.x, c.color.y, d.color.y));
-  *q = Four(vec4u(c.key.z, d.key.z, c.key.w, d.key.w), vec4u(c.color.z, d.color.z, c.color.w, d.color.w));
+// Behind all others.
+const LAST = Four(vec4u(0xffffffffu), vec4u(0u));
+
+// Of twelve, those of places 2 and 4, 3 and 5, 6 and 8, 7 and 9.
+fn order_two_apart(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<function, Four>) {
+  var near = Four(vec4u((*p).key.zw, (*q).key.zw), vec4u((*p).color.zw, (*q).color.zw));
+  var far = Four(vec4u((*q).key.xy, (*r).key.xy), vec4u((*q).color.xy, (*r).color.xy));
+  put_in_order(&near, &far);
+  *p = Four(vec4u((*p).key.xy, near.key.xy), vec4u((*p).color.xy, near.color.xy));
+  *q = Four(vec4u(far.key.xy, near.key.zw), vec4u(far.color.xy, near.color.zw));
+  *r = Four(vec4u(far.key.zw, (*r).key.zw), vec4u(far.color.zw, (*r).color.zw));
 }
 
-fn backwards(four: Four) -> Four { return Four(four.key.wzyx, four.color.wzyx); }
+// Of twelve, those of places 1 and 2, 3 and 4, 5 and 6, 7 and 8.
+fn order_neighbours(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<function, Four>) {
+  var near = Four(vec4u((*p).key.yw, (*q).key.yw), vec4u((*p).color.yw, (*q).color.yw));
+  var far = Four(
+    vec4u((*p).key.z, (*q).key.xz, (*r).key.x), vec4u((*p).color.z, (*q).color.xz, (*r).color.x),
+  );
+  put_in_order(&near, &far);
+  *p = Four(vec4u((*p).key.x, near.key.x, far.key.x, near.key.y), vec4u((*p).color.x, near.color.x, far.color.x, near.color.y));
+  *q = Four(vec4u(far.key.y, near.key.z, far.key.z, near.key.w), vec4u(far.color.y, near.color.z, far.color.z, near.color.w));
+  *r = Four(vec4u(far.key.w, (*r).key.yzw), vec4u(far.color.w, (*r).color.yzw));
+}
 
-// Eight splats in any order become eight in order.
+// Eight splats in any order become eight in order, by Batcher's odd-even merges (1968): 19 pairs.
 fn sort_eight(p: ptr<function, Four>, q: ptr<function, Four>) {
   put_in_order(p, q);
   // Pairs of pairs.
@@ -159,23 +170,43 @@ fn sort_eight(p: ptr<function, Four>, q: ptr<function, Four>) {
   var d = Four(vec4u(b.key.xz, 0u, 0u), vec4u(b.color.xz, 0u, 0u));
   put_in_order(&c, &d);
   *p = Four(vec4u(a.key.x, c.key.x, d.key.x, b.key.y), vec4u(a.color.x, c.color.x, d.color.x, b.color.y));
-  *q = backwards(Four(vec4u(a.key.z, c.key.y, d.key.y, b.key.w), vec4u(a.color.z, c.color.y, d.color.y, b.color.w)));
+  *q = Four(vec4u(a.key.z, c.key.y, d.key.y, b.key.w), vec4u(a.color.z, c.color.y, d.color.y, b.color.w));
   put_in_order(p, q);
-  straighten(p, q);
+  var last = LAST;
+  order_two_apart(p, q, &last);
+  order_neighbours(p, q, &last);
 }
 
-// Two lists of eight, each in order, become the nearer eight and the farther eight, each in order.
-fn merge_eights(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<private, Four>, s: ptr<private, Four>) {
-  var t = backwards(*s);
-  var u = backwards(*r);
-  put_in_order(p, &t);
-  put_in_order(q, &u);
-  put_in_order(p, q);
-  straighten(p, q);
-  put_in_order(&t, &u);
-  straighten(&t, &u);
-  *r = t;
-  *s = u;
+// Eight splats in order go into sixteen in order: the nearest eight come out, in order. An odd-even merge of 45 pairs, as the eight were sixteen, half of them LAST.
+fn merge_into(
+  p: ptr<function, Four>, q: ptr<function, Four>,
+  w: ptr<private, Four>, x: ptr<private, Four>, y: ptr<private, Four>, z: ptr<private, Four>,
+) {
+  var a = *w;
+  var b = *x;
+  var c = *y;
+  var d = *z;
+  var e = *p;
+  var f = *q;
+  put_in_order(&a, &e);
+  put_in_order(&b, &f);
+  put_in_order(&c, &e);
+  put_in_order(&d, &f);
+  put_in_order(&b, &c);
+  put_in_order(&d, &e);
+  var last = LAST;
+  order_two_apart(&a, &b, &c);
+  order_two_apart(&c, &d, &e);
+  order_two_apart(&e, &f, &last);
+  order_neighbours(&a, &b, &c);
+  order_neighbours(&c, &d, &e);
+  order_neighbours(&e, &f, &last);
+  *p = a;
+  *q = b;
+  *w = c;
+  *x = d;
+  *y = e;
+  *z = f;
 }
 
 fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
@@ -240,25 +271,15 @@ fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, least_
     var q = next_four(&walk, own_block, place, least_power);
     sort_eight(&p, &q);
     // What leaves the window at its near end leaves it in order; what comes goes to its place.
-    merge_eights(&p, &q, &window_0, &window_1);
-    var leaving_p = p;
-    var leaving_q = q;
-    p = window_0;
-    q = window_1;
-    merge_eights(&p, &q, &window_2, &window_3);
-    window_0 = p;
-    window_1 = q;
+    merge_into(&p, &q, &window_0, &window_1, &window_2, &window_3);
+    let leaving_p = p;
+    let leaving_q = q;
     if (is_wide) {
       p = window_2;
       q = window_3;
-      merge_eights(&p, &q, &window_4, &window_5);
+      merge_into(&p, &q, &window_4, &window_5, &window_6, &window_7);
       window_2 = p;
       window_3 = q;
-      p = window_4;
-      q = window_5;
-      merge_eights(&p, &q, &window_6, &window_7);
-      window_4 = p;
-      window_5 = q;
     }
     blend_four(pixel, leaving_p);
     blend_four(pixel, leaving_q);
