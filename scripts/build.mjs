@@ -57,7 +57,7 @@ async function bundleElement() {
 
 /** The script of threads that commands start. */
 async function bundleThreads() {
-  const { bundleThreadScript } = await import('../packages/cli/src/lib/thread-script.mjs');
+  const { bundleThreadScript } = await import('../packages/cli/src/lib/thread-pool.mjs');
   await bundleThreadScript();
 }
 

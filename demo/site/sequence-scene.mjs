@@ -4,7 +4,7 @@
  */
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { deflate } from '../../packages/cli/src/lib/deflate.mjs';
+import { deflate } from '../../packages/cli/src/lib/encoders.mjs';
 
 const FRAMES = 24;
 const FRAMES_PER_SECOND = 12;

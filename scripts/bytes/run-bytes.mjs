@@ -11,7 +11,7 @@ import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/economi
 import { readScene } from '@gaussian-splat/formats';
 import { cloudOfChunks, decodePage, deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
-import { encodeWebp } from '../../packages/cli/src/lib/webp.mjs';
+import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
 import { writeSplat } from './splat.mjs';

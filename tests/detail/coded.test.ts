@@ -27,7 +27,7 @@ import {
   type PageSteps,
 } from '@gaussian-splat/renderer';
 import { constants, pageLayout } from '@gaussian-splat/renderer/stages';
-import { deflate } from '../../packages/cli/src/lib/deflate.mjs';
+import { deflate } from '../../packages/cli/src/lib/encoders.mjs';
 import { detailFolder } from '../support/detail-folder.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
 import { randomSource } from '../support/gpu.js';

@@ -12,7 +12,7 @@ import {
 } from '@gaussian-splat/economise';
 import { readLodScene, readScene } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer';
-import { encodeWebp } from '../../packages/cli/src/lib/webp.mjs';
+import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { randomSource } from '../support/gpu.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 

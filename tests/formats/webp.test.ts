@@ -1,8 +1,8 @@
 /** The decoder of lossless WebP: round trips through a plain writer here, real images against Chromium in browser/webp.test.ts. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { WebpError } from '../../packages/formats/dist/webp/bits.js';
 import { decodeWebp } from '../../packages/formats/dist/webp/decode.js';
-import { WebpError } from '../../packages/formats/dist/webp/webp-error.js';
 import { seededRandom } from '../support/random.js';
 import { writeWebp } from './support/webp-writer.js';
 

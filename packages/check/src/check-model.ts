@@ -7,13 +7,14 @@ import {
   GaussianSplatError,
   readOnnxHeader,
   resolveContract,
+  type Contract,
   type ContractFault,
   type OnnxHeader,
   type ReportSection,
   type ResolvedContract,
 } from '@gaussian-splat/core';
 import { openModel, readText, type ModelLocation } from './model-location.js';
-import { runLocation } from './run-model.js';
+import { runModel, type RunReport, type Runtime } from './run-samples.js';
 
 export interface CheckOptions {
   /** Path or address of a contract, which then counts before every other. */
@@ -79,4 +80,20 @@ async function contractOf(
     if (error instanceof ContractError) return { faults: error.faults };
     throw error;
   }
+}
+
+/** Runs a model at a path or an address, see {@link runModel}. */
+async function runLocation(location: ModelLocation, header: OnnxHeader, contract: Contract): Promise<RunReport> {
+  const externalData = await Promise.all(
+    header.externalFiles.map(async ({ location: path }) => ({ path, data: await location.external(path) })),
+  );
+  return runModel(await loadRuntime(), { bytes: await location.bytes(), externalData }, header, contract);
+}
+
+/** Loaded only when a model is to be run: the runtime is large. */
+async function loadRuntime(): Promise<Runtime> {
+  const ort = await import('onnxruntime-web');
+  ort.env.logLevel = 'error';
+  ort.env.wasm.numThreads = 1;
+  return ort;
 }

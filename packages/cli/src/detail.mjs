@@ -17,9 +17,9 @@ import {
 } from '@gaussian-splat/renderer';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { findSteps } from './lib/coded-pages.mjs';
-import { deflate } from './lib/deflate.mjs';
+import { deflate } from './lib/encoders.mjs';
 import { writeWhole } from './lib/output-file.mjs';
-import { readWhole } from './lib/read-whole.mjs';
+import { readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 

@@ -16,11 +16,11 @@ import {
 } from '@gaussian-splat/economise';
 import { inline } from '@gaussian-splat/economise/parts';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
-import { encodeWebp } from './lib/webp.mjs';
+import { encodeWebp } from './lib/encoders.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
-import { readJson } from './lib/read-json.mjs';
+import { readJson } from './lib/input-file.mjs';
 import { startReading } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 

@@ -7,8 +7,7 @@ import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } f
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
-import { readJson } from './lib/read-json.mjs';
-import { readWhole } from './lib/read-whole.mjs';
+import { readJson, readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat render SCENE --camera CAMERA.json --out IMAGE.png [options]
 

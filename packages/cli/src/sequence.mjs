@@ -7,7 +7,7 @@ import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.m
 import { codeSequence } from './lib/moving-sequence.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { writeWhole } from './lib/output-file.mjs';
-import { readWhole } from './lib/read-whole.mjs';
+import { readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat sequence MANIFEST --out FOLDER [options]
 

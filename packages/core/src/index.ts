@@ -1,7 +1,6 @@
 export * from './bounds.js';
 export * from './camera.js';
 export * from './errors.js';
-export * from './filter.js';
 export * from './gaussian-cloud.js';
 export * from './linear.js';
 export * from './load-module.js';

@@ -10,7 +10,7 @@ import type { CameraController } from './controllers/camera-controller.js';
 import type { FlyHost } from './controllers/fly-controller.js';
 import type { InputOptions } from './controllers/input-controller.js';
 import { MotionController, type MotionHost } from './controllers/motion-controller.js';
-import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/mover.js';
+import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/motion-controller.js';
 import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
 
 /** What the behaviours ask of their element. */

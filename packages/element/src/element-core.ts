@@ -1,7 +1,7 @@
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { InputOptions } from './controllers/input-controller.js';
-import { prefersReducedMotion } from './controllers/mover.js';
+import { prefersReducedMotion } from './controllers/motion-controller.js';
 import type { GaussianSplatEventMap } from './events.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';

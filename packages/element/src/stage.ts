@@ -8,7 +8,7 @@ import { CameraController } from './controllers/camera-controller.js';
 import { DetailController, type DetailHost } from './controllers/detail-controller.js';
 import type { HotspotController, HotspotHost } from './controllers/hotspot-controller.js';
 import type { InputController, InputHost } from './controllers/input-controller.js';
-import { prefersReducedMotion } from './controllers/mover.js';
+import { prefersReducedMotion } from './controllers/motion-controller.js';
 import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
 import { PrintController } from './controllers/print-controller.js';
 import { RevealController, type RevealHost } from './controllers/reveal-controller.js';

@@ -1,6 +1,5 @@
 import { foreignName } from './foreign-signatures.js';
-import { sceneFormats } from './formats.js';
-import { signedFormat } from './signed-format.js';
+import { sceneFormats, signedFormat } from './formats.js';
 import type { SceneFormat, SceneFormatName } from './scene-format.js';
 import { looksLikeSplats } from './splat/plausible.js';
 

@@ -1,9 +1,10 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
 import { refuse, type LoadLimits } from './budget.js';
 import { quote } from './bytes.js';
 import { Download } from './download.js';
 import { label } from './network-errors.js';
-import { outOfMemory } from './out-of-memory.js';
+import { outOfMemory } from './scene-errors.js';
+import type { OpenPart } from './scene-format.js';
 
 /** `maxBytes` and `maxSeconds` end the download with `out-of-memory/budget`. */
 export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSeconds'> {
@@ -120,4 +121,25 @@ function delay(ms: number, signal: AbortSignal | undefined): Promise<void> {
     }, ms);
     signal?.addEventListener('abort', give, { once: true });
   });
+}
+
+/**
+ * A way to the other files of the scene at an address, for `ReadSceneOptions.openPart`: each is fetched from beside it with the
+ * same options, and with the scene's query unless the scene gives it one of its own.
+ *
+ * @param url absolute address of the scene's own file.
+ * @param optionsOf options for each part, by its path.
+ */
+export function openPartAt(url: string | URL, optionsOf: (path: string) => FetchSceneOptions): OpenPart {
+  return (path, query) => fetchScene(partAddress(url, path, query), optionsOf(path));
+}
+
+/** Address of another file of the scene at an address. Every part of the path is encoded, so that it can be no address of another server. */
+export function partAddress(url: string | URL, path: string, query = ''): URL {
+  // Two slashes would begin the name of a server.
+  const encoded = path
+    .replace(/^\/+/, '/')
+    .split('/')
+    .map((part) => (part === '..' || part === '.' ? part : encodeURIComponent(part)));
+  return partUrl(encoded.join('/') + query, url);
 }

@@ -1,4 +1,5 @@
 import { asciiOf, startsWith } from './bytes.js';
+import { loadDiagnosis } from './load-parts.js';
 
 /** Tells a kind of file by its bytes, or by its first words. */
 type Fits = (bytes: Uint8Array, text: string) => boolean;
@@ -35,4 +36,15 @@ const SAMPLE_BYTES = 1024;
 export function sampleText(bytes: Uint8Array): string {
   // A byte-order mark is three such characters.
   return asciiOf(bytes, 0, SAMPLE_BYTES).replace(/^\u00ef\u00bb\u00bf/, '');
+}
+
+/**
+ * A file that a scene names, unless it is what servers send in place of one that is missing: a page, or the pointer of a file that git LFS never fetched.
+ * @param name what error messages call it
+ * @throws GaussianSplatError `decode/html`, `decode/lfs-pointer`
+ */
+export async function checkedPart(bytes: Uint8Array, name: string): Promise<Uint8Array> {
+  if (!/^(html|lfsPointer)$/.test(foreignName(bytes) ?? '')) return bytes;
+  const { diagnose } = await loadDiagnosis();
+  throw diagnose(bytes, name, '', 'the file that the scene names');
 }

@@ -1,15 +1,14 @@
 export { LoadBudget, type LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
-export { fetchScene, type FetchSceneOptions } from './fetch-scene.js';
+export { fetchScene, openPartAt, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './formats.js';
-export { outOfMemory } from './out-of-memory.js';
-export { openPartAt } from './open-part.js';
+export { outOfMemory } from './scene-errors.js';
 export { readLodScene, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';
 export { readCoarsest } from './lod/read-coarsest.js';
 export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { readPrefix } from './read-prefix.js';
 export { MOST_DROPPED, readScene, type ReadSceneOptions } from './read-scene.js';
-export { isSequence } from './is-sequence.js';
+export { isSequence, MAX_HEADER_BYTES as HEADER_BYTES } from './signatures.js';
 export type { FileBytes } from './bytes.js';
 export {
   frameAt,
@@ -35,6 +34,5 @@ export {
   type MovingPart,
 } from './motion.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
-export { MAX_HEADER_BYTES as HEADER_BYTES } from './ply/header-bytes.js';
 export { readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
 export { samplePreview } from './preview.js';

@@ -1,5 +1,5 @@
 import { asciiOf, grouped, quote } from './bytes.js';
-import { damaged } from './damaged.js';
+import { damaged } from './faults.js';
 import type { SceneSource } from './scene-format.js';
 
 export type Json = Record<string, unknown>;

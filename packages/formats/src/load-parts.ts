@@ -1,6 +1,8 @@
 import { loadModule } from '@gaussian-splat/core';
 import type * as detection from './detect.js';
 import type * as diagnosis from './diagnose.js';
+import type * as leftOut from './left-out.js';
+import type * as previews from './preview.js';
 import type { SceneFormat, SceneReader } from './scene-format.js';
 
 /** The parts of this package that are loaded when they are first needed. All throw GaussianSplatError `network/unreachable`. */
@@ -15,3 +17,11 @@ export const loadDiagnosis = (): Promise<typeof diagnosis> =>
 /** What knows formats without a signature. */
 export const loadDetection = (): Promise<typeof detection> =>
   loadModule('the code that tells formats by their names', () => import('./detect.js'));
+
+/** What makes previews of scenes that are there. */
+export const loadPreviews = (): Promise<typeof previews> =>
+  loadModule('the code that makes previews', () => import('./preview.js'));
+
+/** What says how much of a file cannot be drawn. */
+export const loadLeftOut = (): Promise<typeof leftOut> =>
+  loadModule('the code of warnings', () => import('./left-out.js'));

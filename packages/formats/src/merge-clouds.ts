@@ -1,6 +1,6 @@
-import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud, type LevelRun, type ShDegree } from '@gaussian-splat/core';
 import { allocateCloud, type DraftCloud } from './cloud.js';
-import { warn } from './warn.js';
+import { warn } from './faults.js';
 import type { SceneSource } from './scene-format.js';
 
 /** Splats `first` to `first + count` of a cloud. */
@@ -50,4 +50,17 @@ function copyPart({ cloud, first, count }: CloudPart, to: DraftCloud, at: number
       for (let k = 0; k < from; k++) to.sh[stride * (at + i) + k] = cloud.sh[from * (first + i) + k];
     }
   }
+}
+
+/** Part of a cloud, and what it shows: a node of the scene at a level. */
+export type NodePart = CloudPart & Pick<LevelRun, 'node' | 'level'>;
+
+/** Where the parts lie once they are merged. */
+export function levelRunsOf(parts: readonly NodePart[]): LevelRun[] {
+  let first = 0;
+  return parts.map(({ count, node, level }) => {
+    const run = { first, count, node, level };
+    first += count;
+    return run;
+  });
 }

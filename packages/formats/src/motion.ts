@@ -1,9 +1,9 @@
 import { type GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { type LoadBudget } from './budget.js';
 import { GrowingBytes, grouped, viewOf } from './bytes.js';
-import { checkedPart } from './checked-part.js';
-import { damaged } from './damaged.js';
-import { noSplats } from './no-splats.js';
+import { checkedPart } from './foreign-signatures.js';
+import { damaged } from './faults.js';
+import { noSplats } from './scene-errors.js';
 
 /** What may change from frame to frame, in the order of files, and how many numbers of a splat it is. */
 export const MOVING = { position: 3, rotation: 3, scale: 3, opacity: 1, color: 3 } as const;

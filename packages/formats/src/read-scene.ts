@@ -1,12 +1,10 @@
-import { GaussianSplatError, keepUsable, loadModule, type GaussianCloud } from '@gaussian-splat/core';
+import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
-import { loadDetection, loadDiagnosis, loadReader } from './load-parts.js';
-import { noSplats } from './no-splats.js';
-import { outOfMemory } from './out-of-memory.js';
-import { previewWanted } from './preview-wanted.js';
-import type { OpenPart, SceneSource } from './scene-format.js';
-import { signedFormat } from './signed-format.js';
+import { signedFormat } from './formats.js';
+import { loadDetection, loadDiagnosis, loadLeftOut, loadPreviews, loadReader } from './load-parts.js';
+import { emptyFile, noSplats, outOfMemory } from './scene-errors.js';
+import { previewWanted, type OpenPart, type SceneSource } from './scene-format.js';
 
 /** Share of a file's splats that may be left out without a word. */
 export const MOST_DROPPED = 0.05;
@@ -85,7 +83,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   signal?.throwIfAborted();
   // Checking and packing all splats takes longer than reading them, so that a preview is worth its while even now.
   if (!hasPreview && previewWanted(source, whole.count)) {
-    const { samplePreview } = await loadModule('the code that makes previews', () => import('./preview.js'));
+    const { samplePreview } = await loadPreviews();
     await preview(samplePreview(whole));
   }
   const cloud = keepUsable(whole);
@@ -93,15 +91,6 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   const { count, droppedCount } = cloud;
   if (count === 0) throw noSplats(name, droppedCount);
   if (droppedCount <= MOST_DROPPED * (count + droppedCount)) return cloud;
-  const { withLeftOut } = await loadModule('the code of warnings', () => import('./left-out.js'));
+  const { withLeftOut } = await loadLeftOut();
   return withLeftOut(cloud, name);
-}
-
-function emptyFile(name: string): GaussianSplatError {
-  return new GaussianSplatError('decode/empty', {
-    where: `${name}, byte 0`,
-    expected: 'a scene file',
-    found: '0 bytes',
-    remedy: 'check the address of the scene and the upload; the file is empty',
-  });
 }

@@ -29,6 +29,14 @@ export interface SceneSource {
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
 
+/** Smaller scenes are read as fast as a preview would be. */
+const MIN_PREVIEWED = 50_000;
+
+/** True if somebody wants a preview of a scene of so many splats, and the scene is large enough for one to be worth its time. */
+export function previewWanted({ onPreview }: SceneSource, count: number): boolean {
+  return onPreview !== undefined && count >= MIN_PREVIEWED;
+}
+
 /**
  * Opens another file of the same scene.
  *

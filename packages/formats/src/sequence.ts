@@ -1,8 +1,8 @@
 import { LoadBudget } from './budget.js';
 import { grouped } from './bytes.js';
-import { damaged } from './damaged.js';
-import { MAX_MANIFEST_BYTES } from './is-sequence.js';
+import { damaged } from './faults.js';
 import { parseJson, show, type Json } from './json.js';
+import { MAX_MANIFEST_BYTES } from './signatures.js';
 
 /** Scene files that follow one another in time. */
 export interface SceneSequence {

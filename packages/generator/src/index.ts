@@ -27,7 +27,7 @@ export { compareParts, isDifferent, type ComparedPart, type Comparison } from '.
 export type { Verdict } from './proof/record.js';
 export type { RunOutputs, SessionKind } from './runtime/live-session.js';
 export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
-export { readTensors, type TensorPart } from './runtime/read-tensors.js';
+export { readTensors, type TensorPart } from './runtime/tensor-buffers.js';
 export { openModel, type GeneratorModel, type ModelSource } from './runtime/open-model.js';
 export { acquireSession, type AcquireOptions, type SessionLease } from './runtime/shared-sessions.js';
 export type { GeneratorState } from './state.js';

@@ -1,7 +1,7 @@
+import { probeDepth } from './generated/probe-shaders.js';
 import { layouts } from './generated/shaders.js';
-import { BUFFER_USAGE } from './gpu/kernel.js';
+import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import { ProbeDepthStage } from './stages/probe-depth.js';
 
 /** A point of the image that was drawn last. */
 export interface ProbePoint {
@@ -32,6 +32,23 @@ export interface ProbeSource {
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
   readonly order: GPUBuffer;
+}
+
+/** Opacity and depth under single points of the last frame; a workgroup a point. */
+export class ProbeDepthStage {
+  readonly #kernel: ComputeKernel<typeof probeDepth>;
+
+  constructor(device: GPUDevice) {
+    this.#kernel = kernelOf(device, probeDepth);
+  }
+
+  bind(resources: Resources<typeof probeDepth>): GPUBindGroup {
+    return this.#kernel.bind(resources);
+  }
+
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, points: number): void {
+    this.#kernel.dispatch(pass, bindings, points);
+  }
 }
 
 const { storage, copySource, copyDestination, mapRead } = BUFFER_USAGE;

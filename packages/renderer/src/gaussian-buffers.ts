@@ -3,7 +3,7 @@ import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
-import { turn } from './gpu/turn.js';
+import { turn } from './gpu/page-thread.js';
 import { MemoryLedger, type Reservation } from './memory-ledger.js';
 import { DETAIL_NUMBERS } from './detail/chunk-detail.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';

@@ -4,7 +4,6 @@ export { createRenderer } from './choice/choose.js';
 export { autotune, startVariants, type AutotuneOptions, type StartOptions } from './choice/choose.js';
 export type { AutotuneStore } from './choice/kept-choice.js';
 export type { ProbeAnswer, ProbePoint } from './depth-probe.js';
-export { deviceDescriptor } from './device.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianPage, GaussianScene, PageRequests } from './gaussian-scene.js';
@@ -13,8 +12,7 @@ export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type PerFrameSettings, type RenderSettings, type Quality } from './render-settings.js';
 export { LinearColours } from './linear-colours.js';
-export { packWithDetail } from './detail/pack-with-detail.js';
-export { buildPackedLevels, type PackedLevels } from './detail/packed-levels.js';
+export { buildPackedLevels, packWithDetail, type PackedLevels } from './detail/packed-levels.js';
 export { packLevelRuns } from './detail/pack-runs.js';
 export { DetailedGaussians } from './detail/detailed-gaussians.js';
 export {
@@ -59,6 +57,7 @@ export {
   type TargetView,
 } from './frame-target.js';
 export { Renderer } from './renderer.js';
+export { deviceDescriptor } from './requirements.js';
 export { UncheckedViewpoint, type View, type ViewpointOptions } from './viewpoint.js';
 export { boundsOfWorld } from './world-bounds.js';
 export { Placement, World, type Box, type Placed } from './world.js';

@@ -2,6 +2,7 @@
 export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
 export { CapacityMemory, type Capacity, type LookedAt } from './capacity-memory.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
+export { ProbeDepthStage } from './depth-probe.js';
 export * from './generated/budget-shaders.js';
 export * from './generated/depth-shaders.js';
 export * from './generated/linear-shaders.js';
@@ -43,7 +44,6 @@ export { CullChunksStage, cullGroups, CullStage } from './stages/cull.js';
 export { DetailBudgetStage } from './stages/detail-budget.js';
 export { IngestStage } from './stages/ingest.js';
 export { PlanStage, scanBytes } from './stages/plan.js';
-export { ProbeDepthStage } from './stages/probe-depth.js';
 export { ProjectStage } from './stages/project.js';
 export { sortedIn, SortStage, type SortBuffers } from './stages/sort.js';
 export { leafLevel, type SplatLevel } from './detail/splat-level.js';

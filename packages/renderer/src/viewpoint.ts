@@ -12,10 +12,11 @@ import { writeStruct } from './gpu/struct.js';
 import { orderOn } from './lazy-order.js';
 import { completed, type RenderSettings } from './render-settings.js';
 import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
-import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
+import { QuadsRasterizer } from './rasterizers/quads.js';
 import type { AuxiliaryFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
-import { requireTextureSize } from './requirements.js';
+import { TilesRasterizer } from './rasterizers/tiles.js';
+import { requireBlendable, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -506,6 +507,13 @@ export class UncheckedViewpoint {
     this.#accumulations.set(key, made);
     return made;
   }
+}
+
+/** @throws GaussianSplatError `unsupported/limits` if the variant needs a feature that the device lacks. */
+function makeRasterizer(device: GPUDevice, { rasterizer, accumulation, threads }: Variants): Rasterizer {
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, accumulation, threads);
+  requireBlendable(device, accumulation);
+  return new QuadsRasterizer(device, accumulation);
 }
 
 /** Whether a frame is drawn as one at rest is: with fewer pixels, or painted less far, it says less of what a frame needs. */

@@ -2,7 +2,7 @@
 import { boundsOf } from '@gaussian-splat/core';
 import { allocateSteps, GpuEvaluator, scaledSteps, viewsAround } from '@gaussian-splat/economise';
 import { cloudOfChunks, codingOf, decodePage, manifestOf, PageEncoder, USUAL_STEPS } from '@gaussian-splat/renderer';
-import { deflateQuickly } from './deflate.mjs';
+import { deflateQuickly } from './encoders.mjs';
 
 /** Numbers of a splat that each step is that of; of harmonics half, for many are 0 anyway. */
 const numbersOf = (degree) => ({

@@ -12,8 +12,7 @@ import {
 } from '@gaussian-splat/economise';
 import { LoadBudget, movedCloud, MOVING, readMotion, readScene } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer';
-import { deflate, deflateQuickly } from './deflate.mjs';
-import { encodeWebp } from './webp.mjs';
+import { deflate, deflateQuickly, encodeWebp } from './encoders.mjs';
 
 /** Of what may be lost the first frame loses so much; motion adds the rest. */
 const FIRST_SHARE = 0.5;

@@ -2,7 +2,7 @@
 import { dirname, join } from 'node:path';
 import { isMainThread, parentPort, Worker, workerData } from 'node:worker_threads';
 import { readScene } from '@gaussian-splat/formats';
-import { readWhole } from './read-whole.mjs';
+import { readWhole } from './input-file.mjs';
 import { packError, unpackError } from './thread-errors.mjs';
 
 /** A scene file as a cloud in shared memory, read while the caller does something else. Rejects as `readScene` does, or with the error of the file system. */

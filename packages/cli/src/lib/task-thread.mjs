@@ -1,7 +1,8 @@
 /** A thread of a `ThreadPool`: does one task after another. */
+import { closeSync, openSync, readSync } from 'node:fs';
 import { parentPort } from 'node:worker_threads';
-import { tasks } from '@gaussian-splat/economise/parts';
-import { readFilePart } from './file-part.mjs';
+import { readBlocks, tasks } from '@gaussian-splat/economise/parts';
+import { readPrefix } from '@gaussian-splat/formats';
 import { packError } from './thread-errors.mjs';
 
 const known = { ...tasks, readFilePart };
@@ -16,3 +17,33 @@ async function answer({ name, input }) {
 }
 
 parentPort.on('message', (task) => (last = last.then(() => answer(task))));
+
+/**
+ * The task of scene-in-parts.mjs: reads some rows of a PLY file into columns. What is read at once is a file of its own: the header, and then some rows.
+ * @param head the file up to its first row
+ */
+async function readFilePart({ path, head, rowBytes, part, to }) {
+  const file = openSync(path);
+  let room = new Uint8Array(0);
+  try {
+    return await readBlocks(part, to, ({ first, end }) => {
+      const byteLength = head.length + rowBytes * (end - first);
+      if (room.length < byteLength) {
+        room = new Uint8Array(byteLength);
+        room.set(head);
+      }
+      fill(file, room.subarray(head.length, byteLength), head.length + rowBytes * first);
+      return readPrefix(room.subarray(0, byteLength), { name: path });
+    });
+  } finally {
+    closeSync(file);
+  }
+}
+
+function fill(file, bytes, from) {
+  for (let at = 0; at < bytes.length;) {
+    const length = readSync(file, bytes, at, bytes.length - at, from + at);
+    if (length === 0) throw new Error(`the file ended at byte ${from + at}: it has changed while it was read`);
+    at += length;
+  }
+}

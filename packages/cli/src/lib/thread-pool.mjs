@@ -1,8 +1,9 @@
 /** Threads that do the tasks of `@gaussian-splat/economise`, in memory that they share: a `TaskPool`, see packages/economise/src/parts/task-pool.ts. */
+import { existsSync } from 'node:fs';
 import { availableParallelism } from 'node:os';
+import { fileURLToPath } from 'node:url';
 import { Worker } from 'node:worker_threads';
 import { unpackError } from './thread-errors.mjs';
-import { threadScript } from './thread-script.mjs';
 
 /** More threads have little to gain: most of the work is moving memory. */
 const MOST_THREADS = 16;
@@ -11,6 +12,13 @@ export const usualThreads = () => Math.min(MOST_THREADS, availableParallelism())
 
 /** Fewer splats are done before threads are started and have run themselves in; measured on two cores, when starting took each a tenth of a second of a processor (a third of that now). */
 const LEAST_SPLATS = 1 << 18;
+
+/** The script of a thread, in one file: a thread that loads a hundred modules, as every one of sixteen does, takes five times as long to start. */
+const SOURCE = new URL('./task-thread.mjs', import.meta.url);
+const BUNDLE = new URL('../../../../.cache/threads/task-thread.mjs', import.meta.url);
+
+/** Where it is: what the last build made of it, else its source. */
+const threadScript = () => (existsSync(BUNDLE) ? BUNDLE : SOURCE);
 
 export class ThreadPool {
   /** Each with the tasks that it has not answered yet, in their order. */
@@ -82,4 +90,17 @@ class TaskThread {
   close() {
     return this.#worker.terminate();
   }
+}
+
+/** Makes the script of a thread, once the packages are built. */
+export async function bundleThreadScript() {
+  const { build } = await import('esbuild');
+  await build({
+    entryPoints: [fileURLToPath(SOURCE)],
+    outfile: fileURLToPath(BUNDLE),
+    bundle: true,
+    format: 'esm',
+    platform: 'node',
+    logLevel: 'warning',
+  });
 }

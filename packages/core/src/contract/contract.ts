@@ -1,5 +1,4 @@
-import type { SplatFilter } from '../filter.js';
-import type { ShDegree } from '../gaussian-cloud.js';
+import type { ShDegree, SplatFilter } from '../gaussian-cloud.js';
 import type { Vector3 } from '../vector.js';
 
 /**

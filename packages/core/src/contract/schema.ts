@@ -2,7 +2,7 @@
  * The JSON Schema of contracts, and the one place that says what a contract's JSON may hold: `parseContract` follows it, and
  * contract.schema.json is its copy for other languages (`node scripts/write-contract-schema.mjs`).
  */
-import { SPLAT_FILTERS, type SplatFilter } from '../filter.js';
+import { SPLAT_FILTERS, type SplatFilter } from '../gaussian-cloud.js';
 
 /** The part of JSON Schema (draft 2020-12) that the contract uses. */
 export interface Schema {

@@ -8,8 +8,8 @@ import type { ElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import type { LiveState } from '../live/live-model.js';
 import type { Source } from '../stage-host.js';
-import { adopt } from './adopt.js';
 import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
+import type { Composition } from './composition.js';
 import type { Part } from './part.js';
 import { matrixOf, readMatrix } from './placing.js';
 
@@ -265,3 +265,12 @@ export const childDeclarations = (
   currentTime: { attribute: false, noAccessor: true },
   playbackRate: { attribute: false, noAccessor: true },
 });
+
+/** The compositions of elements that have children. */
+export const compositions = new WeakMap<Element, Composition>();
+
+/** Gives a child to its element. One that has not looked at its children yet asks for them itself. */
+export function adopt(child: SplatChild): void {
+  const { parentElement } = child;
+  child.holder.attach((parentElement && compositions.get(parentElement)) ?? null);
+}

@@ -1,7 +1,6 @@
 /** Loaded when an element has its first child that is a scene or a mesh: what shows them beside its own scene. */
 import type { Stage } from '../stage.js';
-import { adopt, compositions } from './adopt.js';
-import { SplatChild } from './child.js';
+import { adopt, compositions, SplatChild } from './child.js';
 import { ComposedStage } from './composed-stage.js';
 import { Composition } from './composition.js';
 import { SplatMeshElement } from './splat-mesh.js';

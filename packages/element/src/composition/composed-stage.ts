@@ -7,7 +7,7 @@ import type { DetailLevers, LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { Frame } from '../live/frame-filter.js';
 import { Stage } from '../stage.js';
 import type { SceneStats } from '../stats.js';
-import { compositions } from './adopt.js';
+import { compositions } from './child.js';
 import type { Composition } from './composition.js';
 
 /** No field of its own: the stage is there before it becomes one. */

@@ -3,7 +3,7 @@ import { boundsOfWorld, type FrameTarget, type ProbeAnswer, type ProbePoint } fr
 import type { ViewerFrame } from '../camera/orbit.js';
 import { frameOf, type SceneBounds } from '../camera/settings.js';
 import type { MotionHost } from '../controllers/motion-controller.js';
-import { prefersReducedMotion } from '../controllers/mover.js';
+import { prefersReducedMotion } from '../controllers/motion-controller.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import type { Entrance, SceneState } from '../controllers/scene-controller.js';
 import type { ElementError } from '../errors.js';

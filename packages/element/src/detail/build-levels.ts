@@ -1,7 +1,7 @@
 /** Loaded only where levels of detail are asked for, or the GPU is too slow without. */
 import { DetailedGaussians, readPacked, type PackedLevels } from '@gaussian-splat/renderer';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import { buffersOf } from '../loading/buffers-of.js';
+import { buffersOf } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
 /**

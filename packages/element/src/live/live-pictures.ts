@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { imageShapeOf, type GeneratorModel, type GpuTensor } from '@gaussian-splat/generator';
 import { ImageTensor, type ImageShape } from '@gaussian-splat/renderer';
-import { fetchBeside } from './fetch-beside.js';
+import { fetchBeside } from './model-files.js';
 import { valueOf, type ImageSource, type ImageSources } from './values.js';
 
 export interface LivePicturesOptions {

@@ -6,7 +6,7 @@ import { inputsOf, type GeneratorInput } from './inputs.js';
 import type { LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
 import { compareOf, offerPanel } from './of-element.js';
-import { readsHeaders } from './read-header.js';
+import { readsHeaders } from './model-files.js';
 import { StateReader } from './read-state.js';
 
 export interface PostRequest extends Pick<

@@ -2,7 +2,7 @@
 import { readPrefix, samplePreview } from '@gaussian-splat/formats';
 import { packShare, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer';
 import type { GaussianCloud, ShDegree, Vector3 } from '@gaussian-splat/core';
-import { buffersOf } from './buffers-of.js';
+import { buffersOf } from './protocol.js';
 
 /** Rows of a PLY to be packed. */
 export interface ShareRequest {

@@ -3,26 +3,40 @@
  * {@link loadScene} and the others itself; then nothing here listens.
  */
 import { loadModule, type OpenedModel } from '@gaussian-splat/core';
+import { fetchScene } from '@gaussian-splat/formats';
 import type { DetailManifest } from '@gaussian-splat/renderer';
-import { buffersOf } from './buffers-of.js';
-import { fetchFile } from './fetch-file.js';
+import {
+  buffersOf,
+  type BoxRequest,
+  type FileRequest,
+  type LoadedBoxes,
+  type LoadedScene,
+  type ModelRequest,
+  type MovedFrameRequest,
+  type PageMessage,
+  type ProgressListener,
+  type SceneRequest,
+  type WorkerMessage,
+  type WorkerRequest,
+} from './protocol.js';
 import { loadScene, loadSequenceCode, named } from './load-scene.js';
 import type * as boxes from './lod-boxes.js';
-import type {
-  BoxRequest,
-  FileRequest,
-  LoadedBoxes,
-  LoadedScene,
-  ModelRequest,
-  MovedFrameRequest,
-  PageMessage,
-  ProgressListener,
-  SceneRequest,
-  WorkerMessage,
-  WorkerRequest,
-} from './protocol.js';
 
-export { fetchFile, loadScene };
+export { loadScene };
+
+/**
+ * The bytes of one file, in a buffer of their own, or the words of coded pages. Throws GaussianSplatError (`network/*`, `decode/*`), or the signal's reason once that is aborted.
+ */
+export async function fetchFile(
+  { url, credentials, limits, coded }: FileRequest,
+  signal: AbortSignal,
+): Promise<ArrayBuffer> {
+  const { maxBytes, maxSeconds } = limits ?? {};
+  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, maxBytes, maxSeconds });
+  if (coded === undefined) return bytes.slice().buffer;
+  // What read the manifest is there already.
+  return (await import('./open-manifest.js')).decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
+}
 
 const loadBoxCode = (): Promise<typeof boxes> =>
   loadModule('the code that streams SOG', () => import('./lod-boxes.js'));

@@ -2,7 +2,7 @@ import { css, html, nothing, render, type ReactiveController, type ReactiveContr
 import type { Behaviours } from '../behaviours.js';
 import type { Pose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
-import { prefersReducedMotion, type Mover } from '../controllers/mover.js';
+import { prefersReducedMotion, type Mover } from '../controllers/motion-controller.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import { languageOf, type SpokenStrings, type ViewWord } from '../words.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';

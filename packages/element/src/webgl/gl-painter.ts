@@ -3,8 +3,8 @@ import { isSameView, orderView, drawn as whenDrawn, type OrderView } from '@gaus
 import type { CanvasFrame, Painter, PainterEvents, Rendering, Surface } from '../gpu/painter.js';
 import type { ReadCounts } from '../stats.js';
 import { DepthSorter, type SortedSplats } from './depth-sorter.js';
-import { cannotShow } from './errors.js';
 import type { GlLoaded } from './gl-loaded.js';
+import { cannotShow } from './gl-session.js';
 
 /** An order that is older when it is drawn, ms, is made anew on the page's thread, where that is known to take no longer than the second. */
 const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];

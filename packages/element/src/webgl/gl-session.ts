@@ -1,7 +1,7 @@
 /** One WebGL context for all elements of a page: browsers end the oldest of more than 8 or 16. Elements show copies of what it draws. */
+import { GaussianSplatError } from '@gaussian-splat/core';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
 import type { DeviceLease } from '../gpu/shared-device.js';
-import { cannotShow } from './errors.js';
 
 /** A share in the page's context. Its `device` stands where one of WebGPU is asked for. */
 export interface GlLease extends DeviceLease {
@@ -104,3 +104,22 @@ function start(): GlSession | undefined {
   });
   return gl && !gl.isContextLost() ? new GlSession(gl) : undefined;
 }
+
+/** What WebGL cannot show. @param cause why there is no WebGPU */
+export const cannotShow = (what: string, cause?: unknown): GaussianSplatError =>
+  new GaussianSplatError('unsupported/webgl', {
+    where: 'this page, which draws with WebGL 2 in place of WebGPU',
+    expected: 'one scene file, alone, that fits into memory',
+    found: what,
+    remedy: 'use a browser with WebGPU, or show a scene file here',
+    cause,
+  });
+
+/** Of a page that asks for WebGL by name. */
+export const noWebGl = (): GaussianSplatError =>
+  new GaussianSplatError('unsupported/webgl', {
+    where: 'this browser',
+    expected: 'WebGL 2',
+    found: 'none',
+    remedy: 'switch on hardware acceleration in the browser settings, or leave the attribute renderer out',
+  });

@@ -3,9 +3,8 @@ import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { isGenerator, isStreamed, type OpenOptions } from '../gpu/open-scene.js';
 import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
-import { cannotShow, noWebGl } from './errors.js';
 import { GlLoaded } from './gl-loaded.js';
-import { acquireGl, type GlLease } from './gl-session.js';
+import { acquireGl, cannotShow, noWebGl, type GlLease } from './gl-session.js';
 
 /** What a picture has besides the element's own scene. */
 const CHILDREN = 'splat-scene, splat-mesh';

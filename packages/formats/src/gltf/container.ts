@@ -1,6 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { asciiOf, grouped, startsWith, viewOf } from '../bytes.js';
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 import { parseJson, show, type JsonSource } from '../json.js';
 
 export type Json = Record<string, unknown>;

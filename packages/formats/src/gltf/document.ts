@@ -1,8 +1,8 @@
 import { loadModule } from '@gaussian-splat/core';
 import { alignedTo4, grouped, hostIsLittleEndian } from '../bytes.js';
-import { checkedPart } from '../checked-part.js';
+import { checkedPart } from '../foreign-signatures.js';
 import type { LoadBudget } from '../budget.js';
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 import type { OpenPart, SceneSource, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';

@@ -1,7 +1,7 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { allocateCloud, expInPlace, SH_C0, type DraftCloud } from '../cloud.js';
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
 import { transformCloud } from '../transform/transform-cloud.js';

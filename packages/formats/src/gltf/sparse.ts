@@ -1,5 +1,5 @@
 import { grouped, viewOf } from '../bytes.js';
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 import { isObject } from '../json.js';
 import type { SplatRange } from '../scene-format.js';
 import { COMPONENTS, type GltfDocument } from './document.js';

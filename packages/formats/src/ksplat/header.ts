@@ -1,7 +1,7 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped, viewOf } from '../bytes.js';
-import { damaged } from '../damaged.js';
-import { HEADER_BYTES } from './signature.js';
+import { damaged } from '../faults.js';
+import { KSPLAT_HEADER_BYTES as HEADER_BYTES } from '../signatures.js';
 
 const SECTION_HEADER_BYTES = 1024;
 

@@ -1,7 +1,7 @@
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { grouped } from '../bytes.js';
-import { damaged } from '../damaged.js';
-import { partAddress } from '../open-part.js';
+import { damaged } from '../faults.js';
+import { partAddress } from '../fetch-scene.js';
 import { parseLodMeta } from './meta.js';
 
 /** Splats `first` to `first + count` of one SOG file of a streamed scene. */

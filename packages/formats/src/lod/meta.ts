@@ -1,4 +1,4 @@
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 import { grouped } from '../bytes.js';
 import { isObject, parseJson, show, type JsonSource } from '../json.js';
 

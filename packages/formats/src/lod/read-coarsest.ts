@@ -1,8 +1,7 @@
 import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
-import { levelRunsOf, type NodePart } from './node-parts.js';
-import { noSplats } from '../no-splats.js';
-import { mergeClouds } from '../merge-clouds.js';
+import { levelRunsOf, mergeClouds, type NodePart } from '../merge-clouds.js';
+import { noSplats } from '../scene-errors.js';
 import type { LodScene, SogAddress, SogRun } from './boxes.js';
 import { cut, type FetchBytes, type SogFiles } from './sog-files.js';
 

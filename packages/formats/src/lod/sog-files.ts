@@ -1,12 +1,11 @@
 import { GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { LoadBudget } from '../budget.js';
 import { grouped } from '../bytes.js';
-import { checkedPart } from '../checked-part.js';
-import { damaged } from '../damaged.js';
-import { partAddress } from '../open-part.js';
-import { readSogPart } from '../sog/read-part.js';
+import { checkedPart } from '../foreign-signatures.js';
+import { damaged } from '../faults.js';
+import { partAddress } from '../fetch-scene.js';
+import { readSogPart } from '../sog/read-sog.js';
 import type { SogAddress, SogRun } from './boxes.js';
-import { Gate } from './gate.js';
 
 /** Brings a file, or rejects; aborted when no caller waits for it any more. */
 export type FetchBytes = (url: string, signal: AbortSignal) => Promise<Uint8Array>;
@@ -166,4 +165,25 @@ export function cut(cloud: GaussianCloud, run: SogRun, budget?: LoadBudget): Gau
     opacities: part(cloud.opacities, 1),
     sh: part(cloud.sh, 3 * shCoefficientCount(cloud.shDegree)),
   };
+}
+
+/** Lets so many in at a time, in the order in which they came. */
+class Gate {
+  #free: number;
+  readonly #queue: (() => void)[] = [];
+
+  constructor(places: number) {
+    this.#free = places;
+  }
+
+  /** Waits for a place. @returns what gives it back */
+  async enter(): Promise<() => void> {
+    if (this.#free > 0) this.#free--;
+    else await new Promise<void>((resolve) => this.#queue.push(resolve));
+    return () => {
+      const next = this.#queue.shift();
+      if (next) next();
+      else this.#free++;
+    };
+  }
 }

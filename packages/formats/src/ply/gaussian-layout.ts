@@ -1,7 +1,9 @@
-import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
-import { DEGREE_OF_REST_COUNT } from '../cloud.js';
+import { GaussianSplatError, loadModule, shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
+import { DEGREE_OF_REST_COUNT, type DraftCloud } from '../cloud.js';
 import type { SceneSource } from '../scene-format.js';
 import type { PlyElement, PlyHeader, PlyProperty } from './header.js';
+import type * as meaning from './meaning.js';
+import type { ColumnTarget } from './rows.js';
 
 /** How the splats of a PLY file are laid out, as far as files differ. */
 export interface GaussianLayout {
@@ -80,6 +82,43 @@ export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree |
     found: `${rest.length}${isComplete ? '' : ', with gaps in their numbers'}`,
     remedy: 'export the file again with a whole degree of spherical harmonics',
   });
+}
+
+/**
+ * Where the properties `f_rest_*` go. They hold the coefficients above the constant one channel by channel, red first;
+ * a cloud holds the channels side by side. `degree` is that of the file; bands above the cloud's degree are left out.
+ */
+export function harmonicTargets(degree: number, cloud: DraftCloud): ColumnTarget[] {
+  const kept = shCoefficientCount(cloud.shDegree);
+  const stored = (degree + 1) ** 2 - 1;
+  const targets: ColumnTarget[] = [];
+  for (let channel = 0; channel < 3; channel++) {
+    for (let k = 1; k < kept; k++) {
+      const property = `f_rest_${channel * stored + k - 1}`;
+      targets.push({ property, array: cloud.sh, stride: 3 * kept, offset: 3 * k + channel });
+    }
+  }
+  return targets;
+}
+
+/** Properties that plain splats have, up to degree 3, packed ones too; normals mean nothing. */
+export const PLAIN = /^(n?[xyz]|f_dc_\d|f_rest_([1-3]?\d|4[0-4])|opacity|(scale|rot)_\d|red|green|blue|packed_.*)$/;
+/** Elements that say what the vertices are, or that are drawn beside them. */
+const ODD = /^(face|tristrips|codebook_centers)$/;
+/** LAM writes offsets from a mesh in place of positions, and only the name of the file tells it. */
+export const OFFSETS = /offset\.ply$/i;
+
+/** What knows the meaning of a header that says more than which numbers follow; undefined for all others. */
+export async function loadMeaning(
+  { comments, elements }: PlyHeader,
+  fileName: string,
+): Promise<typeof meaning | undefined> {
+  const isOdd = elements.some(
+    ({ name, properties }) =>
+      ODD.test(name) || (/^(vertex|sh)$/.test(name) && properties.some((own) => !PLAIN.test(own.name))),
+  );
+  if (comments.length === 0 && !isOdd && !OFFSETS.test(fileName)) return undefined;
+  return loadModule('the code that reads what a PLY says of itself', () => import('./meaning.js'));
 }
 
 function notSplats(source: SceneSource, expected: string, found: string): GaussianSplatError {

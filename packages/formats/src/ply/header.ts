@@ -1,7 +1,7 @@
-import { MAX_HEADER_BYTES, USUAL_HEADER_BYTES } from './header-bytes.js';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { asciiOf, grouped, quote } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
+import { MAX_HEADER_BYTES, USUAL_HEADER_BYTES } from '../signatures.js';
 
 const SCALARS = [
   ...(['int8', 'uint8', 'int16', 'uint16', 'int32', 'uint32', 'int64', 'uint64'] as const),

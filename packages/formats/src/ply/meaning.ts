@@ -2,9 +2,9 @@
 import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
-import { DEGREE_4, warn } from '../warn.js';
+import { DEGREE_4, warn } from '../faults.js';
+import { OFFSETS, PLAIN } from './gaussian-layout.js';
 import type { PlyHeader } from './header.js';
-import { OFFSETS, PLAIN } from './load-meaning.js';
 
 /** Variance in px² with which Mip-Splatting and Brush's mip mode train. */
 export const MIP_VARIANCE = 0.1;

@@ -1,9 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, type DraftCloud } from '../cloud.js';
-import { shDegreeOf } from '../ply/gaussian-layout.js';
-import { harmonicTargets } from '../ply/harmonics.js';
-import { loadMeaning } from '../ply/load-meaning.js';
+import { harmonicTargets, loadMeaning, shDegreeOf } from '../ply/gaussian-layout.js';
 import { parsePlyHeader, type PlyElement, type PlyHeader } from '../ply/header.js';
 import { openElement, readColumns } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';

@@ -5,7 +5,7 @@ import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
 import { isSplats, isUncompressed, readPrimitive, splatsIn } from '../gltf/primitive.js';
 import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
-import { warn } from '../warn.js';
+import { warn } from '../faults.js';
 import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';

@@ -1,13 +1,11 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { checkedPart } from '../checked-part.js';
-import { damaged } from '../damaged.js';
+import { checkedPart } from '../foreign-signatures.js';
+import { damaged } from '../faults.js';
 import { parseLodMeta, runsAtAllLevels, runsAtLevel, type LodMeta, type NodeRun } from '../lod/meta.js';
-import { levelRunsOf, type NodePart } from '../lod/node-parts.js';
-import { mergeClouds } from '../merge-clouds.js';
-import { previewWanted } from '../preview-wanted.js';
-import type { OpenPart, SceneSource } from '../scene-format.js';
-import { readSogPart } from '../sog/read-part.js';
+import { levelRunsOf, mergeClouds, type NodePart } from '../merge-clouds.js';
+import { previewWanted, type OpenPart, type SceneSource } from '../scene-format.js';
+import { readSogPart } from '../sog/read-sog.js';
 import { noParts } from './sog.js';
 
 /**

@@ -1,8 +1,12 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, sigmoidInPlace, type DraftCloud } from '../cloud.js';
-import { findGaussians, withPlainNames, type GaussianLayout } from '../ply/gaussian-layout.js';
-import { harmonicTargets } from '../ply/harmonics.js';
-import { loadMeaning } from '../ply/load-meaning.js';
+import {
+  findGaussians,
+  harmonicTargets,
+  loadMeaning,
+  withPlainNames,
+  type GaussianLayout,
+} from '../ply/gaussian-layout.js';
 import { exceedsFloat32, parsePlyHeader, type PlyProperty } from '../ply/header.js';
 import { relativePositions } from '../ply/positions.js';
 import { openElement, readColumns, type ColumnTarget, type ElementData } from '../ply/rows.js';

@@ -1,8 +1,7 @@
 import { GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import { startsWith } from '../bytes.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
-import { previewWanted } from '../preview-wanted.js';
-import type { SceneSource } from '../scene-format.js';
+import { previewWanted, type SceneSource } from '../scene-format.js';
 import { Gunzip } from '../spz/gunzip.js';
 import {
   bodyBytes,

@@ -1,6 +1,6 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
 
 /** A value of each byte 0..255, for each channel of a plane. */

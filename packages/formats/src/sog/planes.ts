@@ -1,11 +1,11 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { checkedPart } from '../checked-part.js';
-import { damaged } from '../damaged.js';
+import { checkedPart } from '../foreign-signatures.js';
+import { damaged } from '../faults.js';
 import type { OpenPart, SceneSource } from '../scene-format.js';
+import { WebpError } from '../webp/bits.js';
 import { decodeWebp, webpSize, type WebpImage } from '../webp/decode.js';
 import { decodeNatively } from '../webp/native.js';
-import { WebpError } from '../webp/webp-error.js';
 
 /** Pixels that a plane may have beyond one for each splat: rows and columns that only fill a rectangle. */
 const SPARE_PIXELS = 65_536;

@@ -1,12 +1,11 @@
-import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
-import { grouped } from '../bytes.js';
+import { loadModule, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { grouped, startsWith } from '../bytes.js';
 import { allocateCloud, DEGREE_OF_REST_COUNT, type DraftCloud } from '../cloud.js';
-import { damaged } from '../damaged.js';
-import type { OpenPart, SceneSource } from '../scene-format.js';
+import { damaged } from '../faults.js';
+import { previewWanted, type OpenPart, type SceneSource } from '../scene-format.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
-import { previewWanted } from '../preview-wanted.js';
 import type { WebpImage } from '../webp/decode.js';
-import type { SogMeta } from './meta.js';
+import { parseSogMeta, type SogMeta } from './meta.js';
 import { Planes } from './planes.js';
 import {
   PALETTE_ROW,
@@ -55,6 +54,16 @@ export async function readSogImages(meta: SogMeta, open: OpenPart, source: Scene
   const cloud = unpackGeometry(planes, meta, 1, degree, source);
   unpackHarmonics(labels, paletteOf(meta.shN, palette), cloud);
   return cloud;
+}
+
+/** Reads one SOG of a streamed scene: its `meta.json`, or a bundle of all of its files. @param open finds files beside it */
+export async function readSogPart(source: SceneSource, open: OpenPart): Promise<GaussianCloud> {
+  if (startsWith(source.bytes, 'PK\x03\x04')) {
+    const { openBundle } = await loadModule('the code that reads bundles', () => import('../zip/bundle.js'));
+    const bundle = openBundle(source);
+    return readSogImages(parseSogMeta({ ...source, bytes: bundle.bytes }), bundle.open, source);
+  }
+  return readSogImages(parseSogMeta(source), open, source);
 }
 
 /** The images without which there is nothing to see, all downloaded before the first is decoded. */

@@ -1,8 +1,8 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { grouped, viewOf } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
+import { ZstdError } from '../zstd/bits.js';
 import { decompressZstd } from '../zstd/decompress.js';
-import { ZstdError } from '../zstd/zstd-error.js';
 import { readExtensions, type AxisSigns } from './axes.js';
 import { bytesPerSplat, SPZ_ATTRIBUTES, truncatedHeader, type SpzAttribute, type SpzHeader } from './header.js';
 

@@ -1,8 +1,7 @@
-import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { halfToNumber, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree } from '../cloud.js';
-import { DEGREE_4, warn } from '../warn.js';
-import { float16 } from '../float16.js';
+import { DEGREE_4, warn } from '../faults.js';
 import { harmonicSigns, quaternionSigns, type AxisSigns } from './axes.js';
 import { bytesPerSplat, type SpzHeader } from './header.js';
 import type { SceneSource } from '../scene-format.js';
@@ -47,7 +46,7 @@ function unpackFixedPositions(packed: Uint8Array, fractionalBits: number, axes: 
 
 function unpackHalfPositions(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
   const view = viewOf(packed);
-  for (let i = 0; i < out.length; i++) out[i] = axes[i % 3] * float16(view.getUint16(2 * i, true));
+  for (let i = 0; i < out.length; i++) out[i] = axes[i % 3] * halfToNumber(view.getUint16(2 * i, true));
 }
 
 /** Versions 1 and 2: x, y and z in bytes, -1..1; w is not negative and follows from the unit length. */

@@ -1,8 +1,7 @@
 import { asciiOf, startsWith, viewOf } from '../bytes.js';
-import { BitReader, cut } from './bits.js';
+import { BitReader, cut, WebpError } from './bits.js';
 import { readPixels } from './pixels.js';
 import { readTransform, type Transform } from './transforms.js';
-import { WebpError } from './webp-error.js';
 
 /** A decoded image. */
 export interface WebpImage {

@@ -1,6 +1,5 @@
-import { cut, window32, type BitReader } from './bits.js';
+import { type BitReader, cut, WebpError, window32 } from './bits.js';
 import { LINK, readPrefixCode, type PrefixCode } from './prefix-code.js';
-import { WebpError } from './webp-error.js';
 
 const LITERALS = 256;
 const LENGTH_SYMBOLS = 24;

@@ -1,5 +1,3 @@
-import { addPixels } from './add-pixels.js';
-
 type Predictor = (left: number, top: number, topRight: number, topLeft: number) => number;
 
 const BLACK = 0xff000000;
@@ -54,6 +52,14 @@ export function predict(
     }
   }
   return pixels;
+}
+
+/** Sum of each of the four bytes, modulo 256. */
+export function addPixels(a: number, b: number): number {
+  return (
+    ((((a & 0xff00ff00) >>> 0) + ((b & 0xff00ff00) >>> 0)) & 0xff00ff00) |
+    (((a & 0x00ff00ff) + (b & 0x00ff00ff)) & 0x00ff00ff)
+  );
 }
 
 /** Mean of each byte, rounded down. */

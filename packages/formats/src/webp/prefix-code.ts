@@ -1,5 +1,4 @@
-import type { BitReader } from './bits.js';
-import { WebpError } from './webp-error.js';
+import { type BitReader, WebpError } from './bits.js';
 
 /** Bits that the first table looks up; codes are up to 15 bits long. */
 export const ROOT_BITS = 9;

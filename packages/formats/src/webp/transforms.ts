@@ -1,8 +1,6 @@
-import { addPixels } from './add-pixels.js';
-import type { BitReader } from './bits.js';
+import { type BitReader, WebpError } from './bits.js';
 import { readPixels } from './pixels.js';
-import { predict } from './predictors.js';
-import { WebpError } from './webp-error.js';
+import { addPixels, predict } from './predictors.js';
 
 /** A change that the encoder made to the pixels: how to undo it, and the width of the image before it is undone. */
 export interface Transform {

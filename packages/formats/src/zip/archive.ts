@@ -2,7 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { inflateSync } from 'fflate';
 import type { LoadBudget } from '../budget.js';
 import { grouped, quote, viewOf } from '../bytes.js';
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 import type { SceneSource } from '../scene-format.js';
 import { crc32 } from './crc32.js';
 import { readDirectory, type ZipEntry } from './directory.js';

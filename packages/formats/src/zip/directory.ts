@@ -1,5 +1,5 @@
 import { grouped, viewOf } from '../bytes.js';
-import { damaged } from '../damaged.js';
+import { damaged } from '../faults.js';
 
 /** A file within an archive, as the directory describes it. */
 export interface ZipEntry {

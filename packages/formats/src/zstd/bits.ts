@@ -1,4 +1,16 @@
-import { ZstdError } from './zstd-error.js';
+/** A damaged or unreadable Zstandard stream; `byte` counts from the start of the stream. */
+export class ZstdError extends Error {
+  override readonly name = 'ZstdError';
+  readonly byte: number;
+  /** True if the stream ends too early, false if its content is wrong. */
+  readonly isCut: boolean;
+
+  constructor(message: string, byte: number, isCut = false) {
+    super(message);
+    this.byte = byte;
+    this.isCut = isCut;
+  }
+}
 
 /** Position of the highest set bit of a positive integer below 2^32; 0 for 1. */
 export function highestBit(value: number): number {

@@ -1,8 +1,8 @@
 import { startsWith } from '../bytes.js';
+import { ZstdError } from './bits.js';
 import type { HuffmanTable } from './huffman.js';
 import { littleEndian, MAX_BLOCK, readLiterals } from './literals.js';
 import { executeSequences, type Output, type SequenceTables } from './sequences.js';
-import { ZstdError } from './zstd-error.js';
 
 const FRAME_MAGIC = [0x28, 0xb5, 0x2f, 0xfd];
 

@@ -1,5 +1,4 @@
-import { highestBit } from './bits.js';
-import { ZstdError } from './zstd-error.js';
+import { highestBit, ZstdError } from './bits.js';
 
 /** Decoding table of a finite-state entropy code (RFC 8878, 4.1): state to symbol and to the next state. */
 export interface FseTable {

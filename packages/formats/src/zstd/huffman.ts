@@ -1,6 +1,5 @@
-import { BackwardBits, highestBit } from './bits.js';
+import { BackwardBits, highestBit, ZstdError } from './bits.js';
 import { readFseTable } from './fse.js';
-import { ZstdError } from './zstd-error.js';
 
 /** Decoding table of a prefix code (RFC 8878, 4.2): the next `maxBits` bits to a symbol and the length of its code. */
 export interface HuffmanTable {

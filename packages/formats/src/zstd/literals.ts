@@ -1,5 +1,5 @@
 import { decodeHuffmanStream, readHuffmanTable, type HuffmanTable } from './huffman.js';
-import { ZstdError } from './zstd-error.js';
+import { ZstdError } from './bits.js';
 
 /** Largest content of a block; literals cannot be more. */
 export const MAX_BLOCK = 131_072;

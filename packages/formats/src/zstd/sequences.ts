@@ -1,6 +1,5 @@
-import { BackwardBits } from './bits.js';
+import { BackwardBits, ZstdError } from './bits.js';
 import { buildFseTable, readFseTable, singleSymbolTable, type FseTable } from './fse.js';
-import { ZstdError } from './zstd-error.js';
 
 /** Tables of literal lengths, offsets and match lengths, in the order in which a block describes them. */
 export type SequenceTables = readonly [FseTable, FseTable, FseTable];

@@ -5,7 +5,7 @@ import type { RunOutputs, SessionKind } from '../runtime/live-session.js';
 import type { GeneratorModel, ModelSource } from '../runtime/open-model.js';
 import { acquireSession, type AcquireOptions, type SessionLease } from '../runtime/shared-sessions.js';
 import { watchRuntimeBytes } from '../runtime/runtime-progress.js';
-import { sumProgress } from '../runtime/sum-progress.js';
+import { sumProgress } from '../runtime/fetch-bytes.js';
 import type { GeneratorState } from '../state.js';
 import { connect } from './connect.js';
 import { HandOver } from './hand-over.js';

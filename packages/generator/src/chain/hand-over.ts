@@ -1,5 +1,5 @@
 import { ContractError, numberToHalf } from '@gaussian-splat/core';
-import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-bytes.js';
+import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-buffers.js';
 import { elementsOf, type GpuTensor, type Inputs } from '../input-value.js';
 import type { RunOutputs } from '../runtime/live-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';

@@ -1,5 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { ProgressListener } from './sum-progress.js';
+
+/** Hears how many bytes have arrived, and of how many; undefined while that is not known. */
+export type ProgressListener = (loaded: number, total: number | undefined) => void;
 
 /** How files are fetched. */
 export interface FetchOptions {
@@ -70,6 +72,25 @@ function grown(bytes: Uint8Array, length: number): Uint8Array<ArrayBuffer> {
   larger.set(bytes);
   return larger;
 }
+
+/** Listeners for each of several downloads that tell one of their sum. Its total is known once that of each is. */
+export function sumProgress(count: number, onProgress: ProgressListener): readonly ProgressListener[] {
+  const downloads: { loaded: number; total: number | undefined }[] = Array.from({ length: count }, () => ({
+    loaded: 0,
+    total: undefined,
+  }));
+  return downloads.map((download) => (loaded, total) => {
+    Object.assign(download, { loaded, total });
+    const sum = downloads.reduce<number | undefined>((sum, { total }) => addUnlessUnknown(sum, total), 0);
+    onProgress(
+      downloads.reduce((sum, { loaded }) => sum + loaded, 0),
+      sum,
+    );
+  });
+}
+
+const addUnlessUnknown = (a: number | undefined, b: number | undefined): number | undefined =>
+  a === undefined || b === undefined ? undefined : a + b;
 
 const shorten = (url: string): string => url.slice(0, 200);
 

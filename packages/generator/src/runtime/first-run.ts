@@ -2,8 +2,7 @@ import { elementsOf, isOnGpu, type GpuTensor, type Inputs } from '../input-value
 import type { Evidence } from '../proof/prove.js';
 import type { FixedOutput, RunOutputs } from './live-session.js';
 import type { GeneratorModel } from './open-model.js';
-import { readTensors } from './read-tensors.js';
-import { ELEMENT_BYTES, TENSOR_USAGE } from './tensor-bytes.js';
+import { ELEMENT_BYTES, readTensors, TENSOR_USAGE } from './tensor-buffers.js';
 
 /** Bytes of a piece of an output in which runs are compared, and how many pieces at most, spread over the output. */
 const PIECE_BYTES = 65_536;

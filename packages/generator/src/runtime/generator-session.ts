@@ -9,7 +9,7 @@ import type { GeneratorModel } from './open-model.js';
 import { earlierVerdict, prove, type Evidence } from '../proof/prove.js';
 import type { StartWorker } from '../proof/run-on-cpu.js';
 import type { Verdict } from '../proof/record.js';
-import { ELEMENT_BYTES } from './tensor-bytes.js';
+import { ELEMENT_BYTES } from './tensor-buffers.js';
 import { runFault, startSession } from './start-session.js';
 
 /** Runs that may fail one after the other before a model is given up, or, if it has run before, left alone for a while. */

@@ -13,7 +13,7 @@ import type { ModelOutput } from './model-outputs.js';
 import type { GeneratorModel } from './open-model.js';
 import { numbersOf } from './first-run.js';
 import { SessionBuffers } from './session-buffers.js';
-import { bufferBytes } from './tensor-bytes.js';
+import { bufferBytes } from './tensor-buffers.js';
 
 /** How a session runs: recorded GPU commands, GPU commands made anew, or the CPU. */
 export type SessionKind = 'captured' | 'webgpu' | 'wasm';

@@ -16,9 +16,8 @@ import {
   type OpenedModel,
   type ResolvedContract,
 } from '@gaussian-splat/core';
-import { fetchBytes, type FetchOptions } from './fetch-bytes.js';
+import { fetchBytes, sumProgress, type FetchOptions, type ProgressListener } from './fetch-bytes.js';
 import { modelOutputs, type ModelOutput } from './model-outputs.js';
-import { sumProgress, type ProgressListener } from './sum-progress.js';
 
 /** Where a generator is. */
 export interface ModelSource {

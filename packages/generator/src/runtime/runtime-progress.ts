@@ -1,4 +1,4 @@
-import type { ProgressListener } from './sum-progress.js';
+import type { ProgressListener } from './fetch-bytes.js';
 
 /**
  * Bytes of the runtime's WebAssembly, onnxruntime-web 1.30.0: known before it is asked for, and also where a server that compresses does not tell

@@ -1,4 +1,4 @@
-import { TENSOR_USAGE } from './tensor-bytes.js';
+import { TENSOR_USAGE } from './tensor-buffers.js';
 
 /** GPU buffers of one session, by name; they grow where a picture or a number of rows does. */
 export class SessionBuffers {

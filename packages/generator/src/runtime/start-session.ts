@@ -5,7 +5,7 @@ import { copyOf, evidenceOf, isEqual, readRun, type WrittenRun } from './first-r
 import { LiveSession, type FixedOutputs, type RunOutputs, type SessionKind } from './live-session.js';
 import { loadRuntime, RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
-import { TENSOR_USAGE } from './tensor-bytes.js';
+import { TENSOR_USAGE } from './tensor-buffers.js';
 
 export interface StartOptions {
   readonly model: GeneratorModel;

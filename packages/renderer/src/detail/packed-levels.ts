@@ -1,8 +1,9 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { GEOMETRY_WORDS, type PackedGaussians } from '../pack/pack.js';
+import { GEOMETRY_WORDS, packGaussians, type PackedGaussians, type PackOptions } from '../pack/pack.js';
 import { shWords } from '../pack/sh.js';
-import { buildLevelsAbove } from './build-levels.js';
+import { buildLevelsAbove, finish } from './build-levels.js';
 import { boundLevel, detailRows, DETAIL_NUMBERS, leafErrors, parentErrors, type ChunkErrors } from './chunk-detail.js';
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
 import { chunksOf, type SplatLevel, FACTOR_NUMBERS, type LevelSource } from './splat-level.js';
@@ -94,6 +95,17 @@ export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: Pa
   chunks.set(coarser.chunks, leaves.chunks.length);
   const details = concatenated([leafDetails, coarser.details!]);
   return { ...leaves, count, geometry, sh, chunks, details, leafCount: leaves.count };
+}
+
+/**
+ * Packs a cloud with all its levels of detail: the splats of {@link packGaussians}, in the same places, and behind them a third as many that stand
+ * for four, sixteen and more of them. The settings `detail` and `splatBudget` choose among them; with neither the image is the same.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
+ */
+export function packWithDetail(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
+  const packed = packGaussians(given, options);
+  const levels = finish(buildPackedLevels(packed));
+  return levels === undefined ? packed : joinLevels(packed, levels);
 }
 
 function concatenated(parts: readonly Float32Array[]): Float32Array {

@@ -1,5 +1,5 @@
 import { perDevice } from './kernel.js';
-import { threadWatch, type Told } from './thread-watch.js';
+import { threadWatch, type Told } from './page-thread.js';
 
 /** Empty submissions of which the fastest tells how long a GPU with nothing to do takes to say so. */
 const TRIES = 4;

@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { turn } from '../gpu/turn.js';
+import { turn } from '../gpu/page-thread.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { makeTexture, requireMemory } from './gl.js';
 import { DATA_WIDTH } from './shaders.js';

@@ -1,4 +1,19 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+/** The files of models: their headers, which a worker reads, and what lies beside them. */
+import { GaussianSplatError, type ModelPlace, type OpenedModel } from '@gaussian-splat/core';
+import type { ModelSource } from '@gaussian-splat/generator';
+import type { SceneLimits } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+
+/** Has headers of models read in a worker, within the limits of the page. */
+export function readsHeaders(loader: SceneLoader, limits: SceneLimits | undefined): ModelSource['openHeader'] {
+  return (place: ModelPlace, signal = new AbortController().signal) => {
+    const request = { place, limits };
+    const transfer = 'bytes' in place ? [place.bytes.buffer as ArrayBuffer] : undefined;
+    return loader.ask<OpenedModel>({ type: 'model', request }, signal, ({ openModel }) => openModel(request, signal), {
+      transfer,
+    });
+  };
+}
 
 /**
  * Fetches what belongs to a model: a contract, a picture.

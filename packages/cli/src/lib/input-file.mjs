@@ -1,3 +1,5 @@
+/** Files that commands are given. */
+import { readFileSync } from 'node:fs';
 import { open } from 'node:fs/promises';
 
 /** So much is asked for at once: threads of Node share the work, and none is asked for more than it can read. */
@@ -24,4 +26,9 @@ async function fill(file, bytes, from) {
     if (bytesRead === 0) throw new Error(`the file ended at byte ${from + at}: it has changed while it was read`);
     at += bytesRead;
   }
+}
+
+/** What a JSON file says, with or without the byte-order mark that some editors and shells put before it. */
+export function readJson(path) {
+  return JSON.parse(readFileSync(path, 'utf8').replace(/^\ufeff/, ''));
 }

@@ -1,4 +1,6 @@
+/** What readers say of a file: {@link damaged} ends the load, and {@link warn} tells what of the scene is not drawn. The reader of plain PLY loads none of it. */
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type { DraftCloud } from './cloud.js';
 
 /** The error for a file whose parts contradict one another. All arguments are phrases as `ErrorDetails` describes. */
 export function damaged(
@@ -13,4 +15,14 @@ export function damaged(
       ? 'export the scene again in another variant, for example as SPZ or PLY'
       : 'download or export the file again; it is damaged or incomplete';
   return new GaussianSplatError(code, { where, expected, found, remedy, cause });
+}
+
+/** What is said where degree 4 is cut to 3. */
+export const DEGREE_4 =
+  'Spherical harmonics of degree 4 are drawn up to degree 3; the finest changes of colour with direction are left out.';
+
+/** Adds a sentence about what is not drawn, once. */
+export function warn(cloud: DraftCloud, sentence: string): void {
+  const { warnings = [] } = cloud;
+  if (!warnings.includes(sentence)) cloud.warnings = [...warnings, sentence];
 }

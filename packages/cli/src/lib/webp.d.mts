@@ -1,2 +1,0 @@
-import type { EncodeWebp } from '@gaussian-splat/economise';
-export const encodeWebp: EncodeWebp;
