@@ -12,6 +12,7 @@ import onnx
 import pytest
 
 import gaussian_exporter as gs
+from gaussian_exporter.arrays import rotation_matrices
 from gaussian_exporter.conformance import check_outputs
 from gaussian_exporter.errors import ExportError
 
@@ -200,3 +201,95 @@ def test_a_dict_with_names_of_its_own(tmp_path: Path) -> None:
         gs.export_module(
             Own(), {"t": gs.time(duration=1)}, gs.split(keys | {"positions": "means"}), out=tmp_path / "b.onnx"
         )
+
+
+class Given(torch.nn.Module):  # type: ignore[misc]
+    """Writes what it is told to; the positions follow the time and a slider."""
+
+    def __init__(self, **changes: Any) -> None:
+        super().__init__()
+        plain = {
+            "positions": torch.linspace(-1, 1, 3 * COUNT).reshape(COUNT, 3),
+            "scales": torch.full((COUNT, 3), 0.02),
+            "rotations": torch.tensor([1.0, 0, 0, 0]).repeat(COUNT, 1),
+            "colors": torch.full((COUNT, 3), 0.5),
+            "opacities": torch.full((COUNT, 1), 0.9),
+        }
+        for name, value in (plain | changes).items():
+            self.register_buffer(name, value)
+
+    def forward(self, t: Any, k: Any) -> Any:
+        moved = self.positions + 0.1 * t.sin() + 0 * k
+        return {"positions": moved} | {n: x + 0 * t for n, x in self.named_buffers() if n != "positions"}
+
+
+SLIDER = {"t": gs.time(duration=2), "k": gs.control(-1, 1)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"scales": torch.ones(COUNT, 4)}, r"output scales .*expected \[N, 3\].*found \[64, 4\].*Is the order of"),
+        ({"opacities": torch.ones(COUNT, 3)}, r"output opacities .*expected \[N\] or \[N, 1\], found \[64, 3\]"),
+        ({"colors": torch.ones(COUNT - 1, 3)}, r"output colors .*expected 64 rows, as positions has, found 63 rows"),
+        ({"scales": torch.full((COUNT, 3), -3.0)}, r"output scales, row 0 .*found -3 -3 -3.*scales=.log"),
+        ({"opacities": torch.full((COUNT, 1), 5.0)}, r"output opacities, row 0 .*found 5.*opacities=.logit"),
+    ],
+)
+def test_outputs_that_break_the_contract_are_refused(changes: Any, said: str, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=said):
+        gs.export_module(Given(**changes), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+    assert not (tmp_path / "x.onnx").exists()
+
+
+def test_values_are_checked_where_visitors_go(tmp_path: Path) -> None:
+    class Fading(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            given = super().forward(t, k)
+            return given | {"opacities": given["opacities"] - k}
+
+    with pytest.raises(ExportError, match=r"output opacities, row 0 \(run with controls at least\).*found 1.9"):
+        gs.export_module(Fading(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_rotation_matrices_become_quaternions(order: Any, tmp_path: Path) -> None:
+    quaternions = np.random.default_rng(3).normal(size=(COUNT, 4))
+    # Half turns, too, where the real part is 0.
+    quaternions[:4] = np.eye(4)
+    matrices = torch.tensor(rotation_matrices(quaternions), dtype=torch.float32)
+    layout = gs.split("positions", "scales", "rotations", "colors", "opacities", rotations=order)
+    report = gs.export_module(Given(rotations=matrices), SLIDER, layout, out=tmp_path / "r.onnx", quiet=True)
+    assert report.findings == []
+    written = check_outputs(onnx.load(report.path))["rotations"]
+    found = np.roll(written, 1, 1) if order == "xyzw" else written
+    np.testing.assert_allclose(rotation_matrices(found), matrices, atol=1e-6)
+
+
+def test_scalar_times_and_controls(tmp_path: Path) -> None:
+    inputs = {"t": gs.time(duration=2, shape=()), "k": gs.control(-1, 1, shape=())}
+    report = gs.export_module(Given(), inputs, out=tmp_path / "s.onnx", quiet=True)
+    assert max(report.errors.values()) < 1e-5 and "bounds" in report.contract
+
+
+def test_float64_becomes_float32(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    class Wide(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            turned, _ = self.cell(t.double().reshape(1, 1, 1))
+            return super().forward(t, k) | {"scales": (0.02 + 0 * turned.sum()).expand(COUNT, 3)}
+
+    wide = Wide(positions=torch.linspace(-1, 1, 3 * COUNT).double().reshape(COUNT, 3))
+    wide.cell = torch.nn.GRU(1, 3).double()
+    report = gs.export_module(wide, SLIDER, out=tmp_path / "w.onnx")
+    assert "became float32: positions, cell.weight_ih_l0" in capsys.readouterr().out
+    assert not any("float64" in str(finding) for finding in report.findings)
+    assert not any(t.data_type == onnx.TensorProto.DOUBLE for t in onnx.load(report.path).graph.initializer)
+
+
+def test_types_that_pages_cannot_cast_are_refused(tmp_path: Path) -> None:
+    class Stepped(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            return super().forward(t, k) | {"colors": self.colors * (1 + k).to(torch.int16).float()}
+
+    with pytest.raises(ExportError, match=r"Cast .*is int16, which builds for the web cannot cast.*uint8"):
+        gs.export_module(Stepped(), SLIDER, out=tmp_path / "x.onnx", quiet=True)

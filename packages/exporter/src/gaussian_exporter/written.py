@@ -117,7 +117,7 @@ def read(
         kinds = ("int32", "int64") if field == "count" else ("float32", "float16")
         if shape is None:
             expected = " or ".join(f"[{', '.join(map(str, rule))}]" for rule in rules)
-            remedy = "export the tensor in this shape; is the order of the outputs the module's?"
+            remedy = "is the order of the outputs the module's? If it is, write the tensor in this shape"
             faults.append(Fault("shape", name, where, expected, str(list(values.shape)), remedy))
         elif str(values.dtype) not in kinds:
             remedy = f"cast it to {kinds[0]}"
@@ -197,7 +197,7 @@ def _fault(
 ) -> Fault:
     count = int(wrong.sum())
     more = f"; in {count:,} of {len(wrong):,} rows" if count > 1 else ""
-    where = f"output {part.tensor}, {name} of row {int(wrong.argmax())}"
+    where = f"output {part.tensor}, {'' if name == part.tensor else f'{name} of '}row {int(wrong.argmax())}"
     return Fault(code, part.tensor, where, expected, found + more, remedy)
 
 
