@@ -10,6 +10,7 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any, cast
 
@@ -56,7 +57,20 @@ class ExportReport:
         lines += [f"  {note}" for note in [*self.notes, *told(self.findings)]]
         if not self.findings:
             lines.append("  WebGPU: every node has a kernel, shapes are fixed, the commands can be recorded")
-        return "\n".join([*lines, f'  <gaussian-splat src="{self.path.name}" alt="" camera-controls></gaussian-splat>'])
+        return "\n".join([*lines, f"  {self.html()}"])
+
+    def html(self) -> str:
+        """The element that shows it: playing where it knows the time, with controls for what visitors may set."""
+        inputs = cast(dict[str, Json], self.contract["inputs"])
+        roles = {str(binding["role"]) for binding in inputs.values()}
+        file, shown = escape(self.path.name), {"control", "pose", "shape", "image"}
+        words = [f'src="{file}"', f'alt="{escape(str(self.contract["name"]))}"', "camera-controls"]
+        if cast(Json, self.contract["outputs"])["layout"] == "image":
+            shown.remove("image")
+            words[0] = f'src="scene.ply" postprocess="{file}"'
+        words += ["autoplay loop"] if roles & {"time", "frame"} else []
+        words += ["controls-panel"] if roles & shown else []
+        return f"<gaussian-splat {' '.join(words)}></gaussian-splat>"
 
 
 def export_module(
@@ -69,7 +83,7 @@ def export_module(
     license: str = "not stated",
     attribution: str = "not stated",
     n_max: int | None = None,
-    coordinates: Coordinates | None = None,
+    coordinates: Coordinates | Mapping[str, Any] | None = None,
     antialiased: bool = False,
     filter: Filter | None = None,
     fps: float | None = None,
@@ -81,7 +95,8 @@ def export_module(
     `inputs`: a role for each argument of `forward`, in its order: {"t": time(), "twist": control(-1, 1)}. `outputs`:
     what it returns, split() by default: positions, scales, rotations, colors, opacities. Both of PyTorch's exporters
     are tried; the first whose file computes what the module computes is kept. `batched`: the module takes a batch
-    before every input, [1,72] where the role says [72]; pictures have one anyway. Raises graph/invalid where neither
+    before every input, [1,72] where the role says [72], and [1,1] for a time or a control; pictures have one anyway.
+    `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises graph/invalid where neither
     exporter does, contract/violation where its outputs have another shape than split() says, or numbers out of order.
     """
     import torch
@@ -96,7 +111,7 @@ def export_module(
     given = {"version": 1, "name": name or path.stem}
     facts = _facts(inputs, n_max, fps, antialiased, filter)
     contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **facts}
-    contract |= {"coordinates": (coordinates or Coordinates()).json(), "license": license, "attribution": attribution}
+    contract |= {"coordinates": Coordinates.of(coordinates).json(), "license": license, "attribution": attribution}
     refusals = []
     for exporter in _OPSETS:
         try:

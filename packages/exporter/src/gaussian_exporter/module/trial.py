@@ -63,12 +63,25 @@ def tried(
     """Values of the inputs, and what the module writes with each. Raises argument/value where it does not take them or
     does not repeat itself, contract/violation where no file of it could keep the contract."""
     wrapped, tries = wrapped_module(module, inputs, layout, batched, torch), tries_of(inputs)
-    try:
-        written = [in_torch(wrapped, values, torch) for values in [*tries, tries[0]]]
-    except ExportError:
-        raise
-    except Exception as error:  # whatever the module says of what it is given
-        raise _does_not_take(module, inputs, layout, batched, error, torch) from error
+    written: list[list[AnyArray]] = []
+    for values in [*tries, tries[0]]:
+        try:
+            written.append(in_torch(wrapped, values, torch))
+        except ExportError:
+            raise
+        except Exception as error:  # whatever the module says of what it is given
+            if values is tries[0]:
+                remedy = next(_remedies(module, inputs, layout, batched, torch))
+            else:
+                remedy = "narrow the ranges of its inputs, or mend what it says"
+            shapes = ", ".join(f"{n} {[1, *r.shape] if batched else list(r.shape)}" for n, r in inputs.items())
+            raise ExportError(
+                "argument/value",
+                where=f"module {type(module).__name__}, given {shapes}, {said(values, tries)}",
+                expected="tensors",
+                found=f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}",
+                remedy=remedy,
+            ) from error
     expected, again = written[:-1], written[-1]
     for values, tensors in zip(tries, expected, strict=True):
         faults, attributes = read(layout.json(), dict(zip(layout.outputs, tensors, strict=True)), n_max)
@@ -121,26 +134,15 @@ def told_difference(mine: AnyArray, theirs: AnyArray) -> str:
     return f"differs by {difference(mine, theirs):.1e} of its largest number"
 
 
-def _does_not_take(
-    module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, error: Exception, torch: Any
-) -> ExportError:
-    given = ", ".join(f"{name} {[1, *r.shape] if batched else list(r.shape)}" for name, r in inputs.items())
-    return ExportError(
-        "argument/value",
-        where=f"module {type(module).__name__}, run with its inputs' defaults: {given}",
-        expected="tensors",
-        found=f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}",
-        remedy=next(_remedies(module, inputs, layout, batched, torch)),
-    )
-
-
 def _remedies(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, torch: Any) -> Iterator[str]:
     """What it does run with, the smallest change first; else what may be wrong with its weights."""
     forms: list[tuple[str, bool] | None] = [None]
     if any(role.binding["role"] == "pose" for role in inputs.values()):
         forms += itertools.product(("matrix", "quaternion", "axis-angle"), (False, True))
-    options = itertools.product((batched, not batched), (False, True), forms)
+    options = itertools.product((not batched, batched), (False, True), forms)
     for batch, scalar, form in sorted(options, key=lambda o: (o[0] != batched) + o[1] + (o[2] is not None)):
+        if (batch, scalar, form) == (batched, False, None):
+            continue
         changed = {name: _changed(role, scalar, form) for name, role in inputs.items()}
         wrapped = wrapped_module(module, changed, layout, batch, torch)
         try:
