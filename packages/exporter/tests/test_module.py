@@ -270,6 +270,8 @@ def test_rotation_matrices_become_quaternions(order: Any, tmp_path: Path) -> Non
     written = check_outputs(onnx.load(report.path))["rotations"]
     found = np.roll(written, 1, 1) if order == "xyzw" else written
     np.testing.assert_allclose(rotation_matrices(found), matrices, atol=1e-6)
+    with pytest.raises(ExportError, match=r"expected rotations.*found other 3x3 matrices.*'covariances'"):
+        gs.export_module(Given(rotations=0.1 * matrices), SLIDER, layout, out=tmp_path / "x.onnx", quiet=True)
 
 
 def test_scalar_times_and_controls(tmp_path: Path) -> None:
@@ -287,7 +289,7 @@ def test_float64_becomes_float32(tmp_path: Path, capsys: pytest.CaptureFixture[s
     wide = Wide(positions=torch.linspace(-1, 1, 3 * COUNT).double().reshape(COUNT, 3))
     wide.cell = torch.nn.GRU(1, 3).double()
     report = gs.export_module(wide, SLIDER, out=tmp_path / "w.onnx")
-    assert "became float32: positions, cell.weight_ih_l0" in capsys.readouterr().out
+    assert "became float32: cell.weight_ih_l0, cell.weight_hh_l0" in capsys.readouterr().out
     assert not any("float64" in str(finding) for finding in report.findings)
     assert not any(t.data_type == onnx.TensorProto.DOUBLE for t in onnx.load(report.path).graph.initializer)
 

@@ -26,7 +26,7 @@ from ..written import box_of, read
 from .finish import finish_graph
 from .layouts import Layout, split
 from .roles import Role
-from .trial import difference, in_torch, said, told_difference, tried, wrapped_module
+from .trial import difference, in_torch, said, told_difference, tried, weights_of, wrapped_module
 
 # Largest difference to PyTorch, as a share of the largest number of an output.
 _ALLOWED = 1e-3
@@ -96,8 +96,8 @@ def export_module(
     what it returns, split() by default: positions, scales, rotations, colors, opacities. Both of PyTorch's exporters
     are tried; the first whose file computes what the module computes is kept. `batched`: the module takes a batch
     before every input, [1,72] where the role says [72], and [1,1] for a time or a control; pictures have one anyway.
-    `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises graph/invalid where neither
-    exporter does, contract/violation where its outputs have another shape than split() says, or numbers out of order.
+    `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises graph/invalid where neither exporter does,
+    contract/violation where its outputs have another shape than split() says, or numbers out of order.
     """
     import torch
 
@@ -134,7 +134,7 @@ def export_module(
         check_outputs(model, {n: x for n, x in tries[0].items() if n in contract["inputs"]})  # type: ignore[operator]
         path.write_bytes(model.SerializeToString())
         unused = [f"input {each} is not used: the file has none" for each in inputs if each not in contract["inputs"]]  # type: ignore[operator]
-        doubles = [n for n, each in module.state_dict().items() if each.dtype == torch.float64]
+        doubles = [name for _, name, each in weights_of(module) if each.dtype == torch.float64]
         narrowed = [f"float64, which pages do not cast, became float32: {listed(doubles)}"] if doubles else []
         notes = [*(f"not taken: {refusal}" for refusal in refusals), *unused, *narrowed]
         report = ExportReport(path, exporter, model.opset_import[0].version, complete, errors, findings, notes)

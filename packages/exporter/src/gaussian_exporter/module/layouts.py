@@ -116,6 +116,11 @@ def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
     while x.dim() > wide and x.shape[0] == 1:
         x = x[0]
     if name == "rotations" and are_matrices and x.dim() == 3:
+        # Exporters have no numbers to look at.
+        if not (torch.jit.is_tracing() or torch.compiler.is_compiling()):
+            turned_back = x @ x.transpose(1, 2) - torch.eye(3, device=x.device)
+            if not ((turned_back.abs() < 1e-2).all() and (x.det() > 0).all()):
+                raise _mismatch("rotations, as quaternions or rotation matrices", "other 3x3 matrices", _NO_ROTATION)
         wxyz = _quaternions(x.reshape(-1, 9), torch)
         return wxyz if layout.words["rotationOrder"] == "wxyz" else torch.cat([wxyz[:, 1:], wxyz[:, :1]], -1)
     if name == "covariances" and are_matrices and x.dim() == 3:
@@ -143,6 +148,7 @@ def _quaternions(rows: Any, torch: Any) -> Any:
     return z
 
 
+_NO_ROTATION = "take the scales out of them; R S S^T R^T is 'covariances'"
 _IN_ORDER = "name what it returns, in its order: outputs=split('positions', 'covariances', 'colors', 'opacities')"
 _BY_KEY = "say which key is what: outputs=split({'positions': 'xyz', 'covariances': 'cov', 'colors': 'rgb', ...})"
 

@@ -40,6 +40,12 @@ def in_torch(wrapped: Any, values: Values, torch: Any) -> list[AnyArray]:
         return [tensor.cpu().numpy() for tensor in wrapped(*(torch.from_numpy(np.array(x)) for x in values.values()))]
 
 
+def weights_of(module: Any) -> Iterator[tuple[str, str, Any]]:
+    """Whether a parameter or a buffer, its name, and it."""
+    for kind, weights in (("parameter", module.named_parameters()), ("buffer", module.named_buffers())):
+        yield from ((kind, name, tensor) for name, tensor in weights)
+
+
 def tries_of(inputs: Mapping[str, Role]) -> list[dict[str, AnyArray]]:
     """All defaults; then every input at its other values, together, as many times as the richest has some."""
     most = max((len(role.samples) for role in inputs.values()), default=1)
@@ -155,10 +161,9 @@ def _remedies(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: 
         said += ["shape=() for each time and control"] if scalar else []
         said += [f'pose(..., format="{form[0]}"{", flat=True" * form[1]})'] if form else []
         yield f"give {' and '.join(said)}: it runs with that"
-    for kind, tensors in (("parameter", module.named_parameters()), ("buffer", module.named_buffers())):
-        for name, tensor in tensors:
-            if tensor.is_floating_point() and tensor.dtype != torch.float32:
-                yield f"its {kind} {name} is {str(tensor.dtype).removeprefix('torch.')}: call module.float()"
+    for kind, name, tensor in weights_of(module):
+        if tensor.is_floating_point() and tensor.dtype != torch.float32:
+            yield f"its {kind} {name} is {str(tensor.dtype).removeprefix('torch.')}: call module.float()"
     yield "make forward take these shapes; time(shape=...), control(shape=...) and pose(format=...) say others"
 
 
