@@ -10,6 +10,7 @@ from gaussian_exporter.cli import main
 from .test_classic import cloud
 from .test_hexplane import write_cloud
 
+FIXTURES = Path(__file__).parents[3] / "tests/fixtures"
 FACTS = ["--license", "CC0-1.0", "--attribution", "nobody"]
 
 
@@ -67,8 +68,13 @@ def test_a_folder_is_no_avatar_file(name: str, family: str, tmp_path: Path, caps
 
 
 def test_what_leaves_the_gpu_is_said_without_a_contract_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rule = Path(__file__).parents[3] / "tests/fixtures/rules/grid-sample-20.onnx"
+    rule = FIXTURES / "rules/grid-sample-20.onnx"
     (tmp_path / "a.onnx").write_bytes(rule.read_bytes())
     assert main(["check", str(tmp_path / "a.onnx")]) == 1
     written = capsys.readouterr()
     assert "export opset 18" in written.out and "gaussian_contract" in written.err
+
+
+def test_what_pages_refuse_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(FIXTURES / "generators/faulty-cast.onnx")]) == 1
+    assert "cannot cast" in capsys.readouterr().err

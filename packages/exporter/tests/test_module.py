@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import onnx
 import pytest
 
 import gaussian_exporter as gs
+from gaussian_exporter.arrays import rotation_matrices
 from gaussian_exporter.conformance import check_outputs
+from gaussian_exporter.contract import Coordinates
 from gaussian_exporter.errors import ExportError
 
 torch: Any = pytest.importorskip("torch")
@@ -49,7 +52,8 @@ def test_a_module_in_one_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     report = gs.export_module(Ball(), INPUTS, out=tmp_path / "ball.onnx", license="MIT", attribution="A. Person")
     assert max(report.errors.values()) < 1e-5 and report.findings == [] and report.exporter == "dynamo"
     said = capsys.readouterr().out
-    assert "differs from PyTorch by" in said and '<gaussian-splat src="ball.onnx"' in said
+    assert "differs from PyTorch by" in said
+    assert '<gaussian-splat src="ball.onnx" alt="ball" camera-controls autoplay loop controls-panel>' in said
     model = onnx.load(tmp_path / "ball.onnx")
     shapes = {o.name: [d.dim_value for d in o.type.tensor_type.shape.dim] for o in model.graph.output}
     assert shapes == {
@@ -86,6 +90,9 @@ def test_the_exporter_that_computes_what_pytorch_computes_is_taken(tmp_path: Pat
     layout = gs.split("positions", "covariances", "colors", "opacities")
     report = gs.export_module(Arm(), {"pose": gs.pose(["hip"], [-1])}, layout, out=tmp_path / "arm.onnx", quiet=True)
     assert max(report.errors.values()) < 1e-5
+    assert re.search(
+        r"dynamo: .*: positions has 192 of 192 numbers .*not finite.* at its inputs' defaults", str(report)
+    )
     written = check_outputs(onnx.load(tmp_path / "arm.onnx"))
     assert np.isfinite(written["positions"]).all() and written["covariances"].shape == (COUNT, 6)
     assert contract_of(report.path)["inputs"]["pose"]["joints"] == ["hip"]
@@ -200,3 +207,193 @@ def test_a_dict_with_names_of_its_own(tmp_path: Path) -> None:
         gs.export_module(
             Own(), {"t": gs.time(duration=1)}, gs.split(keys | {"positions": "means"}), out=tmp_path / "b.onnx"
         )
+
+
+class Given(torch.nn.Module):  # type: ignore[misc]
+    """Writes what it is told to; the positions follow the time and a slider."""
+
+    def __init__(self, **changes: Any) -> None:
+        super().__init__()
+        plain = {
+            "positions": torch.linspace(-1, 1, 3 * COUNT).reshape(COUNT, 3),
+            "scales": torch.full((COUNT, 3), 0.02),
+            "rotations": torch.tensor([1.0, 0, 0, 0]).repeat(COUNT, 1),
+            "colors": torch.full((COUNT, 3), 0.5),
+            "opacities": torch.full((COUNT, 1), 0.9),
+        }
+        for name, value in (plain | changes).items():
+            self.register_buffer(name, value)
+
+    def forward(self, t: Any, k: Any) -> Any:
+        moved = self.positions + 0.1 * t.sin() + 0 * k
+        return {"positions": moved} | {n: x + 0 * t for n, x in self.named_buffers() if n != "positions"}
+
+
+SLIDER = {"t": gs.time(duration=2), "k": gs.control(-1, 1)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"scales": torch.ones(COUNT, 4)}, r"output scales .*expected \[N, 3\].*found \[64, 4\].*Is the order of"),
+        ({"opacities": torch.ones(COUNT, 3)}, r"output opacities .*expected \[N\] or \[N, 1\], found \[64, 3\]"),
+        ({"colors": torch.ones(COUNT - 1, 3)}, r"output colors .*expected 64 rows, as positions has, found 63 rows"),
+        ({"scales": torch.full((COUNT, 3), -3.0)}, r"output scales, row 0 .*found -3 -3 -3.*scales=.log"),
+        ({"opacities": torch.full((COUNT, 1), 5.0)}, r"output opacities, row 0 .*found 5.*opacities=.logit"),
+    ],
+)
+def test_outputs_that_break_the_contract_are_refused(changes: Any, said: str, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=said):
+        gs.export_module(Given(**changes), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+    assert not (tmp_path / "x.onnx").exists()
+
+
+def test_values_are_checked_where_visitors_go(tmp_path: Path) -> None:
+    class Fading(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            given = super().forward(t, k)
+            return given | {"opacities": given["opacities"] - k}
+
+    with pytest.raises(ExportError, match=r"output opacities, row 0 \(run with controls at least\).*found 1.9"):
+        gs.export_module(Fading(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_rotation_matrices_become_quaternions(order: Any, tmp_path: Path) -> None:
+    quaternions = np.random.default_rng(3).normal(size=(COUNT, 4))
+    # Half turns, too, where the real part is 0.
+    quaternions[:4] = np.eye(4)
+    matrices = torch.tensor(rotation_matrices(quaternions), dtype=torch.float32)
+    layout = gs.split("positions", "scales", "rotations", "colors", "opacities", rotations=order)
+    report = gs.export_module(Given(rotations=matrices), SLIDER, layout, out=tmp_path / "r.onnx", quiet=True)
+    assert report.findings == []
+    written = check_outputs(onnx.load(report.path))["rotations"]
+    found = np.roll(written, 1, 1) if order == "xyzw" else written
+    np.testing.assert_allclose(rotation_matrices(found), matrices, atol=1e-6)
+    with pytest.raises(ExportError, match=r"expected rotations.*found other 3x3 matrices.*'covariances'"):
+        gs.export_module(Given(rotations=0.1 * matrices), SLIDER, layout, out=tmp_path / "x.onnx", quiet=True)
+
+
+def test_scalar_times_and_controls(tmp_path: Path) -> None:
+    inputs = {"t": gs.time(duration=2, shape=()), "k": gs.control(-1, 1, shape=())}
+    report = gs.export_module(Given(), inputs, out=tmp_path / "s.onnx", quiet=True)
+    assert max(report.errors.values()) < 1e-5 and "bounds" in report.contract
+
+
+def test_float64_becomes_float32(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    class Wide(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            turned, _ = self.cell(t.double().reshape(1, 1, 1))
+            return super().forward(t, k) | {"scales": (0.02 + 0 * turned.sum()).expand(COUNT, 3)}
+
+    wide = Wide(positions=torch.linspace(-1, 1, 3 * COUNT).double().reshape(COUNT, 3))
+    wide.cell = torch.nn.GRU(1, 3).double()
+    report = gs.export_module(wide, SLIDER, out=tmp_path / "w.onnx")
+    assert "became float32: cell.weight_ih_l0, cell.weight_hh_l0" in capsys.readouterr().out
+    assert not any("float64" in str(finding) for finding in report.findings)
+    assert not any(t.data_type == onnx.TensorProto.DOUBLE for t in onnx.load(report.path).graph.initializer)
+
+
+def test_types_that_pages_cannot_cast_are_refused(tmp_path: Path) -> None:
+    class Stepped(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            return super().forward(t, k) | {"colors": self.colors * (1 + k).to(torch.int16).float()}
+
+    with pytest.raises(ExportError, match=r"Cast .*is int16, which builds for the web cannot cast.*uint8"):
+        gs.export_module(Stepped(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+
+
+class Branching(Given):
+    """What PyTorch's own exporter refuses, and TorchScript's bakes in."""
+
+    def forward(self, t: Any, k: Any) -> Any:
+        given = super().forward(t, k)
+        return {name: 2 * x if name == "positions" and float(k) > 0.9 else x for name, x in given.items()}
+
+
+def test_why_no_exporter_is_taken_is_said(tmp_path: Path) -> None:
+    with pytest.raises(ExportError) as raised:
+        gs.export_module(Branching(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+    assert re.search(r"dynamo: \w+: Could not .*data-dependent", raised.value.found)
+    assert re.search(r"TorchScript: .*: positions differs by 5.*, with t = .*, k = 1", raised.value.found)
+    assert "\x1b" not in str(raised.value)
+
+
+def test_a_number_of_rows_that_follows_an_input(tmp_path: Path) -> None:
+    class Rows(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            count = COUNT if float(k) > 0.9 else COUNT // 2
+            return {name: x[:count] for name, x in super().forward(t, k).items()}
+
+    with pytest.raises(ExportError, match=r"found 32 at its inputs' defaults, 64 with .*k = 1.*opacity 0.*n_max=128"):
+        gs.export_module(Rows(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+    with pytest.raises(ExportError, match=r"is \[32, 3\] where the module writes \[64, 3\]: .*\.item\(\)"):
+        gs.export_module(Rows(), SLIDER, out=tmp_path / "x.onnx", n_max=128, quiet=True)
+
+
+def test_what_a_module_takes_instead_is_found(tmp_path: Path) -> None:
+    class Posed(Given):
+        def forward(self, t: Any, joints: Any) -> Any:
+            return super().forward(t, joints[0].det())
+
+    inputs = {"t": gs.time(), "joints": gs.pose(["hip", "knee"])}
+    with pytest.raises(ExportError, match=r'joints \[2, 3\].*Give pose\(\.\.\., format="matrix"\): it runs'):
+        gs.export_module(Posed(), inputs, out=tmp_path / "x.onnx", quiet=True)
+
+    class Scalars(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            return super().forward(t[0], k) if t.dim() < 2 else self.missing
+
+    with pytest.raises(ExportError, match=r"t \[1, 1\].*Give batched=False: it runs"):
+        gs.export_module(Scalars(), SLIDER, out=tmp_path / "x.onnx", batched=True, quiet=True)
+
+    class Layered(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            return super().forward(self.layer(t), k)
+
+    layered = Layered()
+    layered.layer = torch.nn.Linear(1, 1).double()
+    with pytest.raises(ExportError, match=r"Its parameter layer.weight is float64: call module.float\(\)"):
+        gs.export_module(layered, SLIDER, out=tmp_path / "x.onnx", quiet=True)
+
+    class Halved(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            return super().forward(t, [0 * t, k][int(2 * k)] if k > 0 else k)
+
+    with pytest.raises(
+        ExportError, match=r"given t \[1\], k \[1\], with t = .*, k = 1: .*IndexError.*Narrow the ranges"
+    ):
+        gs.export_module(Halved(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+
+
+def test_random_numbers_are_named(tmp_path: Path) -> None:
+    class Noise(Given):
+        def forward(self, t: Any, k: Any) -> Any:
+            given = super().forward(t, k)
+            return given | {"positions": given["positions"] + 0.01 * torch.randn(COUNT, 3)}
+
+    with pytest.raises(ExportError, match=r"output positions .*run twice.*equal inputs.*torch\.randn"):
+        gs.export_module(Noise(), SLIDER, out=tmp_path / "x.onnx", quiet=True)
+
+
+def test_which_axis_is_up(tmp_path: Path) -> None:
+    for given in ({"up": "y"}, gs.Coordinates("+y"), "y"):
+        assert Coordinates.of(given).json() == {"up": "+y", "handedness": "right"}
+    report = gs.export_module(Given(), SLIDER, out=tmp_path / "u.onnx", coordinates={"up": "+z"}, quiet=True)
+    assert contract_of(report.path)["coordinates"]["up"] == "+z"
+    for wrong in ({"up": "w"}, {"upward": "y"}, 3, gs.Coordinates("up")):  # type: ignore[arg-type]
+        with pytest.raises(ExportError, match=r"coordinates: expected up, one of \+x.*found"):
+            gs.export_module(Given(), SLIDER, out=tmp_path / "x.onnx", coordinates=wrong, quiet=True)  # type: ignore[arg-type]
+
+
+def test_the_line_for_a_post_processor(tmp_path: Path) -> None:
+    report = gs.export_module(
+        torch.nn.ReLU(),
+        {"image": gs.image(8, 8)},
+        gs.image_output(),
+        out=tmp_path / "f.onnx",
+        name='"A" & B',
+        quiet=True,
+    )
+    words = 'src="scene.ply" postprocess="f.onnx" alt="&quot;A&quot; &amp; B" camera-controls'
+    assert report.html() == f"<gaussian-splat {words}></gaussian-splat>"

@@ -153,6 +153,9 @@ def check(given: argparse.Namespace) -> None:
         for name, values in check_outputs(model).items():
             print(f"ran on the CPU: {name} {list(values.shape)} {values.dtype}, all checks passed")
     report_findings(model)
+    for finding in gpu_findings(model):
+        if finding.is_refused:
+            raise finding.error()
 
 
 def report_findings(model: onnx.ModelProto) -> None:

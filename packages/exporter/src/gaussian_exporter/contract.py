@@ -6,9 +6,9 @@ Everything this package knows about the words of the contract is in this module.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal, get_args
 
 from .errors import ExportError
 from .graph import INSTANCES_AXIS
@@ -77,6 +77,27 @@ class Coordinates:
     up: Up = "-y"
     handedness: Literal["right", "left"] = "right"
     metres_per_unit: float | None = None
+
+    @staticmethod
+    def of(given: Any) -> Coordinates:
+        """Those that are given, as themselves or as a dict of these fields, or of the contract's; `y` is +y."""
+        if given is None or isinstance(given, Coordinates):
+            fields = vars(given or Coordinates())
+        else:
+            fields = dict(given) if isinstance(given, Mapping) else {"up": given}
+        fields = {"metres_per_unit" if key == "metresPerUnit" else key: value for key, value in fields.items()}
+        up = fields.get("up", "-y")
+        fields["up"] = f"+{up}" if up in ("x", "y", "z") else up
+        is_known = fields["up"] in get_args(Up) and fields.get("handedness", "right") in ("right", "left")
+        if not is_known or fields.keys() - {"up", "handedness", "metres_per_unit"}:
+            raise ExportError(
+                "argument/value",
+                where="coordinates",
+                expected=f"up, one of {', '.join(get_args(Up))}; handedness, right or left; metres_per_unit",
+                found=repr(given),
+                remedy='write coordinates={"up": "+y"}, or Coordinates(up="+y")',
+            )
+        return Coordinates(**fields)
 
     def json(self) -> Json:
         """As the contract writes it."""

@@ -19,6 +19,7 @@ import onnx
 from onnx import TensorProto, helper
 
 from .contract import METADATA_KEY
+from .errors import ExportError
 from .graph import ALIASES
 
 # One rule set with the checker of pages and shells: packages/core/src/onnx/webgpu-rules.ts, of which this is the copy.
@@ -42,6 +43,21 @@ class Finding:
     remedy: str
     # What the node writes first, or the tensor that is meant.
     tensor: str = ""
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether pages refuse the file for it, instead of running it on the CPU."""
+        return self.kind == "failure" and self.operator in ("Cast", "file")
+
+    def error(self) -> ExportError:
+        """To be raised where it is refused."""
+        return ExportError(
+            "contract/violation",
+            where=f"{self.operator} {self.node}".strip(),
+            expected="what ONNX Runtime in a page can run",
+            found=self.reason,
+            remedy=self.remedy,
+        )
 
     def __str__(self) -> str:
         """One line for people."""
@@ -105,7 +121,7 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
         # What hangs on constants alone is computed once, when the session is made.
         if is_folded(node, values):
             values.constants.update(node.output)
-            found += _of_constants(node, values)
+            found += _casts(node, opset, values)
             continue
         found += [finding for rule in _RULES for finding in rule(node, opset, values)]
     return [*found, *_of_copies(model, values)]
@@ -152,11 +168,14 @@ def _is_fixed(value: onnx.ValueInfoProto, axis: str | None) -> bool:
     return tensor.HasField("shape") and None not in [_size(dim, axis) for dim in tensor.shape.dim]
 
 
-def _of_constants(node: onnx.NodeProto, values: _Values) -> Iterator[Finding]:
-    kind = values.types.get(node.input[0])
-    if node.op_type == "Cast" and kind in (TensorProto.UINT16, TensorProto.INT16, TensorProto.DOUBLE):
-        reason = f"{node.input[0]} is {helper.tensor_dtype_to_np_dtype(kind)}, which builds for the web cannot cast"
-        yield Finding("failure", node.name, "Cast", reason, "store uint8 (two of them for 16 bits), float16 or int32")
+def _casts(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
+    for name in [*node.input, *node.output] if node.op_type == "Cast" else ():
+        kind = values.types.get(name)
+        if kind in (TensorProto.UINT16, TensorProto.INT16, TensorProto.DOUBLE):
+            reason = f"{name} is {helper.tensor_dtype_to_np_dtype(kind)}, which builds for the web cannot cast"
+            remedy = "store uint8 (two of them for 16 bits), float16, int32 or float32"
+            yield Finding("failure", node.name, "Cast", reason, remedy)
+            return
 
 
 def _of(kind: Kind, node: onnx.NodeProto, reason: str, remedy: str) -> Finding:
@@ -225,4 +244,4 @@ def miscomputed_convolution(node: onnx.NodeProto, dims: Sequence[int | None]) ->
     return (inputs, outputs) if is_wrong else None
 
 
-_RULES: list[Callable[[onnx.NodeProto, int, _Values], Iterator[Finding]]] = [_kernel, _types, _sizes]
+_RULES: list[Callable[[onnx.NodeProto, int, _Values], Iterator[Finding]]] = [_kernel, _types, _sizes, _casts]

@@ -1,5 +1,6 @@
 """From a PyTorch module to a generator in one call."""
 
+from ..contract import Coordinates
 from .export import ExportReport, export_module, generator
 from .layouts import image_output, packed, split
 from .roles import (
@@ -21,6 +22,7 @@ from .roles import (
 )
 
 __all__ = [
+    "Coordinates",
     "ExportReport",
     "camera",
     "camera_to_world",

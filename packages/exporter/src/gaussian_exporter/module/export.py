@@ -6,9 +6,11 @@ import contextlib
 import inspect
 import io
 import logging
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,12 +18,15 @@ import numpy as np
 import onnx
 
 from ..arrays import AnyArray
+from ..conformance import SHARES, check_outputs
 from ..contract import Coordinates, Filter, Json, metadata
-from ..errors import ExportError
+from ..errors import ExportError, listed
 from ..placement import RULES, Finding, gpu_findings, told
+from ..written import box_of, read
 from .finish import finish_graph
-from .layouts import Layout, fitted, split, tensors_of
+from .layouts import Layout, split
 from .roles import Role
+from .trial import difference, in_torch, said, told_difference, tried, weights_of, wrapped_module
 
 # Largest difference to PyTorch, as a share of the largest number of an output.
 _ALLOWED = 1e-3
@@ -52,7 +57,20 @@ class ExportReport:
         lines += [f"  {note}" for note in [*self.notes, *told(self.findings)]]
         if not self.findings:
             lines.append("  WebGPU: every node has a kernel, shapes are fixed, the commands can be recorded")
-        return "\n".join([*lines, f'  <gaussian-splat src="{self.path.name}" alt="" camera-controls></gaussian-splat>'])
+        return "\n".join([*lines, f"  {self.html()}"])
+
+    def html(self) -> str:
+        """The element that shows it: playing where it knows the time, with controls for what visitors may set."""
+        inputs = cast(dict[str, Json], self.contract["inputs"])
+        roles = {str(binding["role"]) for binding in inputs.values()}
+        file, shown = escape(self.path.name), {"control", "pose", "shape", "image"}
+        words = [f'src="{file}"', f'alt="{escape(str(self.contract["name"]))}"', "camera-controls"]
+        if cast(Json, self.contract["outputs"])["layout"] == "image":
+            shown.remove("image")
+            words[0] = f'src="scene.ply" postprocess="{file}"'
+        words += ["autoplay loop"] if roles & {"time", "frame"} else []
+        words += ["controls-panel"] if roles & shown else []
+        return f"<gaussian-splat {' '.join(words)}></gaussian-splat>"
 
 
 def export_module(
@@ -65,7 +83,7 @@ def export_module(
     license: str = "not stated",
     attribution: str = "not stated",
     n_max: int | None = None,
-    coordinates: Coordinates | None = None,
+    coordinates: Coordinates | Mapping[str, Any] | None = None,
     antialiased: bool = False,
     filter: Filter | None = None,
     fps: float | None = None,
@@ -77,8 +95,9 @@ def export_module(
     `inputs`: a role for each argument of `forward`, in its order: {"t": time(), "twist": control(-1, 1)}. `outputs`:
     what it returns, split() by default: positions, scales, rotations, colors, opacities. Both of PyTorch's exporters
     are tried; the first whose file computes what the module computes is kept. `batched`: the module takes a batch
-    before every input, [1,72] where the role says [72]; pictures have one anyway. Raises graph/invalid where neither
-    exporter does.
+    before every input, [1,72] where the role says [72], and [1,1] for a time or a control; pictures have one anyway.
+    `coordinates`: which axis is up, {"up": "+y"}; -y without it. Raises graph/invalid where neither exporter does,
+    contract/violation where its outputs have another shape than split() says, or numbers out of order.
     """
     import torch
 
@@ -86,40 +105,38 @@ def export_module(
     module = module if isinstance(module, torch.nn.Module) else _module_of(module, torch)
     module.eval()
     refuse_other_arguments(module, inputs)
-    stays = [role.binding["role"] in ("image", "state") or not batched for role in inputs.values()]
-    wrapped = _wrapped(module, layout, stays, torch)
-    tries = _tries(inputs)
-    try:
-        expected = [_in_torch(wrapped, values, torch) for values in tries]
-    except ExportError:
-        raise
-    except Exception as error:  # whatever the module says of what it is given
-        raise _does_not_take(module, inputs, batched, error) from error
-    _require_finite(expected[0], layout)
+    tries, expected = tried(module, inputs, layout, batched, n_max, torch)
+    wrapped = wrapped_module(module, inputs, layout, batched, torch)
+    bounds = _bounds(wrapped, inputs, layout, torch)
     given = {"version": 1, "name": name or path.stem}
     facts = _facts(inputs, n_max, fps, antialiased, filter)
     contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **facts}
-    contract |= {"coordinates": (coordinates or Coordinates()).json(), "license": license, "attribution": attribution}
+    contract |= {"coordinates": Coordinates.of(coordinates).json(), "license": license, "attribution": attribution}
     refusals = []
     for exporter in _OPSETS:
         try:
             model = _export(wrapped, inputs, layout, exporter, torch)
             finish_graph(model, layout, inputs, expected, n_max)
             contract["inputs"] = _bindings(model, inputs, layout)
-            complete = contract | _bounds(wrapped, inputs, layout, torch) | _rows(model, layout, n_max, expected)
+            complete = contract | bounds | _rows(model, layout, n_max, expected)
             onnx.helper.set_model_props(model, metadata(complete))
-            errors = _errors(model, tries, expected, layout)
+            errors, worst = _errors(model, tries, expected, layout)
         except Exception as error:  # an exporter may fail in any way of its own
-            refusals.append(f"{exporter}: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}")
+            refusals.append(f"{exporter}: {_cause(error)}")
             continue
-        worst = max(errors.values(), default=0.0)
-        if not worst <= _ALLOWED:
-            refusals.append(f"{exporter}: computes other numbers than PyTorch (by {worst:.1e})")
+        if not max(errors.values(), default=0.0) <= _ALLOWED:
+            refusals.append(f"{exporter}: computes other numbers than PyTorch: {worst}")
             continue
+        findings = gpu_findings(model)
+        for finding in findings:
+            if finding.is_refused:
+                raise finding.error()
+        check_outputs(model, {n: x for n, x in tries[0].items() if n in contract["inputs"]})  # type: ignore[operator]
         path.write_bytes(model.SerializeToString())
         unused = [f"input {each} is not used: the file has none" for each in inputs if each not in contract["inputs"]]  # type: ignore[operator]
-        notes = [*(f"not taken: {refusal}" for refusal in refusals), *unused]
-        findings = gpu_findings(model)
+        doubles = [name for _, name, each in weights_of(module) if each.dtype == torch.float64]
+        narrowed = [f"float64, which pages do not cast, became float32: {listed(doubles)}"] if doubles else []
+        notes = [*(f"not taken: {refusal}" for refusal in refusals), *unused, *narrowed]
         report = ExportReport(path, exporter, model.opset_import[0].version, complete, errors, findings, notes)
         if not quiet:
             print(report)
@@ -171,59 +188,6 @@ def _module_of(function: Callable[..., Any], torch: Any) -> Any:
     return Function()
 
 
-def _does_not_take(module: Any, inputs: Mapping[str, Role], batched: bool, error: Exception) -> ExportError:
-    given = ", ".join(f"{name} {[1, *r.shape] if batched else list(r.shape)}" for name, r in inputs.items())
-    if batched:
-        remedy = "leave batched out, if it takes no batch; time(shape=...) and control(shape=...) say other shapes"
-    else:
-        remedy = "give batched=True, if it takes a batch; time(shape=...) and control(shape=...) say other shapes"
-    return ExportError(
-        "argument/value",
-        where=f"module {type(module).__name__}, run with its inputs' defaults: {given}",
-        expected="tensors",
-        found=f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}",
-        remedy=remedy,
-    )
-
-
-def _wrapped(module: Any, layout: Layout, stays: Sequence[bool], torch: Any) -> Any:
-    class Named(torch.nn.Module):  # type: ignore[misc]
-        def __init__(self) -> None:
-            super().__init__()
-            self.module = module
-
-        def forward(self, *given: Any) -> Any:
-            taken = [x if stay else x[None] for x, stay in zip(given, stays, strict=True)]
-            tensors = tensors_of(self.module(*taken), layout)
-            return tuple(fitted(n, t, layout, torch) for n, t in zip(layout.outputs, tensors, strict=True))
-
-    return Named().eval()
-
-
-def _tries(inputs: Mapping[str, Role]) -> list[dict[str, AnyArray]]:
-    """All defaults; then every input at its other values, together, as many times as the richest has some."""
-    most = max((len(role.samples) for role in inputs.values()), default=1)
-    return [{name: role.samples[i % len(role.samples)] for name, role in inputs.items()} for i in range(most)]
-
-
-def _in_torch(wrapped: Any, values: Mapping[str, AnyArray], torch: Any) -> list[AnyArray]:
-    with torch.no_grad():
-        return [tensor.cpu().numpy() for tensor in wrapped(*(torch.from_numpy(x.copy()) for x in values.values()))]
-
-
-def _require_finite(tensors: Sequence[AnyArray], layout: Layout) -> None:
-    for name, values in zip(layout.outputs, tensors, strict=True):
-        wrong = int((~np.isfinite(values)).sum())
-        if wrong:
-            raise ExportError(
-                "contract/violation",
-                where=f"output {name} of the module, at its inputs' defaults",
-                expected="finite numbers",
-                found=f"{wrong} of {values.size} that are not",
-                remedy="this is PyTorch's own result: look for a division by zero, or a root of a negative number",
-            )
-
-
 def _export(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, exporter: str, torch: Any) -> onnx.ModelProto:
     args = tuple(torch.from_numpy(role.default.copy()) for role in inputs.values())
     names = {"input_names": list(inputs), "output_names": list(layout.outputs), "opset_version": _OPSETS[exporter]}
@@ -237,6 +201,14 @@ def _export(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, exporter: 
         file = io.BytesIO()
         torch.onnx.export(wrapped, args, file, dynamo=False, **names)
         return onnx.load_from_string(file.getvalue())
+
+
+def _cause(error: BaseException) -> str:
+    """What an exporter stumbled over, in a line: its own error wraps that in advice and colours of a terminal."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    lines = [line for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines() if line.strip()]
+    return f"{type(error).__name__}: {lines[0].strip() if lines else ''}"
 
 
 def _bindings(model: onnx.ModelProto, inputs: Mapping[str, Role], layout: Layout) -> Json:
@@ -266,15 +238,15 @@ def _bounds(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, torch: Any
         return {}
     rest = {name: role.default for name, role in inputs.items()}
     clocks = [name for name, role in inputs.items() if role.binding["role"] == "time"]
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for share in np.linspace(0, 1, 24) if clocks else [0.0]:
+    boxes = []
+    for share in (*np.linspace(0, 1, 24), *SHARES) if clocks else (0.0,):
         moment = {name: (inputs[name].samples[-1] * share).astype(np.float32) for name in clocks}
-        centres = _in_torch(wrapped, rest | moment, torch)[0][:, :3]
-        centres = centres[np.isfinite(centres).all(1)]
-        if len(centres):
-            low, high = np.minimum(low, centres.min(0)), np.maximum(high, centres.max(0))
-    if not np.isfinite([low, high]).all() or any(role.binding["role"] == "image" for role in inputs.values()):
+        tensors = in_torch(wrapped, rest | moment, torch)
+        box = box_of(read(layout.json(), dict(zip(layout.outputs, tensors, strict=True)))[1])
+        boxes += [] if box is None else [box]
+    if not boxes or any(role.binding["role"] == "image" for role in inputs.values()):
         return {}
+    low, high = np.min([box[0] for box in boxes], 0), np.max([box[1] for box in boxes], 0)
     slack = 0.1 * (high - low) + 1e-6
     return {"bounds": {"min": [float(x) for x in low - slack], "max": [float(x) for x in high + slack]}}
 
@@ -290,9 +262,9 @@ def _rows(model: onnx.ModelProto, layout: Layout, n_max: int | None, expected: S
         raise ExportError(
             "argument/value",
             where="n_max",
-            expected="the most Gaussians that a run writes, since their number differs from run to run",
+            expected="the most Gaussians that a run writes, since the file may write another number in each",
             found=f"none; {most} were seen",
-            remedy=f"give n_max={2 * most}; or keep every row and write opacity 0 into the dead ones, which is faster",
+            remedy=f"keep every row, and write opacity 0 into the dead ones; or give n_max={2 * most}",
         )
     return {"nMax": n_max}
 
@@ -302,27 +274,21 @@ def _errors(
     tries: Sequence[Mapping[str, AnyArray]],
     expected: Sequence[Sequence[AnyArray]],
     layout: Layout,
-) -> dict[str, float]:
-    """Largest difference of each output to PyTorch's, as a share of the largest number in it."""
+) -> tuple[dict[str, float], str]:
+    """Largest difference of each output to PyTorch's, as a share of the largest number in it; where it is largest, in
+    words."""
     import onnxruntime as ort
 
     options = ort.SessionOptions()
     options.log_severity_level = 4
     session = ort.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
     there = {value.name for value in session.get_inputs()}
-    errors = dict.fromkeys(layout.outputs, 0.0)
+    errors, worst = dict.fromkeys(layout.outputs, 0.0), ""
     for values, wanted in zip(tries, expected, strict=True):
         feeds = {name: value for name, value in values.items() if name in there}
         for name, mine, theirs in zip(layout.outputs, session.run(list(layout.outputs), feeds), wanted, strict=True):
-            errors[name] = max(errors[name], _difference(np.asarray(mine, np.float64), np.asarray(theirs, np.float64)))
-    return errors
-
-
-def _difference(mine: AnyArray, theirs: AnyArray) -> float:
-    if mine.shape != theirs.shape:
-        return float("inf")
-    both = ~(np.isfinite(mine) | np.isfinite(theirs))
-    apart = np.where(both, 0, np.abs(mine - theirs))
-    scale = max(float(np.abs(theirs[np.isfinite(theirs)]).max(initial=0)), 1e-12)
-    # A number that one has and the other has not.
-    return float(np.nan_to_num(apart, nan=np.inf, posinf=np.inf).max(initial=0)) / scale
+            error = difference(mine, theirs)
+            if error > max(errors.values()):
+                worst = f"{name} {told_difference(mine, theirs)}, {said(values, tries)}"
+            errors[name] = max(errors[name], error)
+    return errors, worst

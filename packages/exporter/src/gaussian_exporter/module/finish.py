@@ -25,6 +25,7 @@ def finish_graph(
     """Changes the model in place."""
     model.ir_version = min(model.ir_version, RULES["newestIr"], 10)
     graph = model.graph
+    _narrow(graph)
     for value, wanted in zip(graph.output, layout.outputs, strict=True):
         if value.name != wanted:
             _name_output(graph, value, wanted)
@@ -33,6 +34,28 @@ def finish_graph(
     _turn_vectors(model)
     _write_by_kernels(model, inputs)
     onnx.checker.check_model(model)
+
+
+def _narrow(graph: onnx.GraphProto) -> None:
+    """Float64 becomes float32, the widest that pages compute in: constants, casts, and what is declared."""
+    for tensor in graph.initializer:
+        _narrow_tensor(tensor)
+    for value in [*graph.input, *graph.value_info, *graph.output]:
+        if value.type.tensor_type.elem_type == TensorProto.DOUBLE:
+            value.type.tensor_type.elem_type = TensorProto.FLOAT
+    for attribute in (attribute for node in graph.node for attribute in node.attribute):
+        if attribute.name in ("to", "dtype") and attribute.i == TensorProto.DOUBLE:
+            attribute.i = TensorProto.FLOAT
+        if attribute.HasField("t"):
+            _narrow_tensor(attribute.t)
+        if attribute.HasField("g"):
+            _narrow(attribute.g)
+
+
+def _narrow_tensor(tensor: onnx.TensorProto) -> None:
+    if tensor.data_type == TensorProto.DOUBLE:
+        with np.errstate(over="ignore"):
+            tensor.CopyFrom(numpy_helper.from_array(numpy_helper.to_array(tensor).astype(np.float32), tensor.name))
 
 
 def _name_output(graph: onnx.GraphProto, value: onnx.ValueInfoProto, wanted: str) -> None:

@@ -101,31 +101,54 @@ def tensors_of(result: Any, layout: Layout) -> list[Any]:
 
 
 def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
-    """The tensor in the contract's shape, where that is the same numbers: a leading 1 dropped, covariances as their
-    upper triangle, one scale a splat three times, colours without their alpha."""
+    """The tensor in the contract's shape, where that is the same Gaussians: a leading 1 dropped, covariances as their
+    upper triangle, rotation matrices as quaternions, one scale a splat three times, colours without their alpha."""
     if layout.state is not None and name == layout.outputs[-1]:
         return tensor
     if name == "count":
-        return tensor.reshape(1).to(torch.int32)
+        return (tensor.reshape(1) if tensor.numel() == 1 else tensor).to(torch.int32)
     x = tensor.float() if tensor.dtype != torch.float32 else tensor
     if layout.kind == "image":
         return x[:, :3] if x.dim() == 4 else x[None, :3]
-    # Covariances may be matrices, harmonics have two axes behind the rows.
-    wide = {"sh": 3, "covariances": 3 if x.shape[-2:] == (3, 3) else 2}.get(name, 2)
+    # Covariances and rotations may be matrices, harmonics have two axes behind the rows.
+    are_matrices = name in ("covariances", "rotations") and x.dim() > 2 and x.shape[-2:] == (3, 3)
+    wide = 3 if name == "sh" or are_matrices else 2
     while x.dim() > wide and x.shape[0] == 1:
         x = x[0]
-    if name == "covariances" and x.dim() == 3:
+    if name == "rotations" and are_matrices and x.dim() == 3:
+        # Exporters have no numbers to look at.
+        if not (torch.jit.is_tracing() or torch.compiler.is_compiling()):
+            turned_back = x @ x.transpose(1, 2) - torch.eye(3, device=x.device)
+            if not ((turned_back.abs() < 1e-2).all() and (x.det() > 0).all()):
+                raise _mismatch("rotations, as quaternions or rotation matrices", "other 3x3 matrices", _NO_ROTATION)
+        wxyz = _quaternions(x.reshape(-1, 9), torch)
+        return wxyz if layout.words["rotationOrder"] == "wxyz" else torch.cat([wxyz[:, 1:], wxyz[:, :1]], -1)
+    if name == "covariances" and are_matrices and x.dim() == 3:
         upper = x.reshape(-1, 9)
         return torch.stack([upper[:, i] for i in (0, 1, 2, 4, 5, 8)], -1)
-    if name == "scales" and (x.dim() == 1 or x.shape[-1] == 1):
+    if name == "scales" and (x.dim() == 1 or (x.dim() == 2 and x.shape[-1] == 1)):
         return x.reshape(-1, 1).expand(-1, 3).clone()
-    if name == "colors" and x.shape[-1] == 4:
+    if name == "colors" and x.dim() == 2 and x.shape[-1] == 4:
         return x[:, :3]
     if name == "opacities" and x.dim() == 1:
         return x[:, None]
     return x
 
 
+def _quaternions(rows: Any, torch: Any) -> Any:
+    """w x y z, of any length, of rotation matrices: a column of 4 q q^T whose diagonal, 4 at most, is 1 or more, since
+    the four sum to 4."""
+    a, b, c, d, e, f, g, h, i = rows.unbind(-1)
+    w = torch.stack([1 + a + e + i, h - f, c - g, d - b], -1)
+    x = torch.stack([h - f, 1 + a - e - i, b + d, c + g], -1)
+    y = torch.stack([c - g, b + d, 1 - a + e - i, f + h], -1)
+    z = torch.stack([d - b, c + g, f + h, 1 - a - e + i], -1)
+    for column, place in ((y, 2), (x, 1), (w, 0)):
+        z = torch.where(column[:, place : place + 1] >= 1, column, z)
+    return z
+
+
+_NO_ROTATION = "take the scales out of them; R S S^T R^T is 'covariances'"
 _IN_ORDER = "name what it returns, in its order: outputs=split('positions', 'covariances', 'colors', 'opacities')"
 _BY_KEY = "say which key is what: outputs=split({'positions': 'xyz', 'covariances': 'cov', 'colors': 'rgb', ...})"
 

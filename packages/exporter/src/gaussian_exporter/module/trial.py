@@ -1,0 +1,179 @@
+"""The module itself, before any exporter: run with values of its inputs, and refused for what its outputs lack."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import AnyArray
+from ..errors import ExportError
+from ..written import read, value_faults
+from .layouts import Layout, fitted, tensors_of
+from .roles import Role, control, pose, time
+
+Values = Mapping[str, AnyArray]
+
+
+def wrapped_module(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, torch: Any) -> Any:
+    """The module with outputs as the contract has them, and a batch before its inputs where it takes one."""
+    stays = [role.binding["role"] in ("image", "state") or not batched for role in inputs.values()]
+
+    class Named(torch.nn.Module):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            self.module = module
+
+        def forward(self, *given: Any) -> Any:
+            taken = [x if stay else x[None] for x, stay in zip(given, stays, strict=True)]
+            tensors = tensors_of(self.module(*taken), layout)
+            return tuple(fitted(n, t, layout, torch) for n, t in zip(layout.outputs, tensors, strict=True))
+
+    return Named().eval()
+
+
+def in_torch(wrapped: Any, values: Values, torch: Any) -> list[AnyArray]:
+    """What the module writes."""
+    with torch.no_grad():
+        return [tensor.cpu().numpy() for tensor in wrapped(*(torch.from_numpy(np.array(x)) for x in values.values()))]
+
+
+def weights_of(module: Any) -> Iterator[tuple[str, str, Any]]:
+    """Whether a parameter or a buffer, its name, and it."""
+    for kind, weights in (("parameter", module.named_parameters()), ("buffer", module.named_buffers())):
+        yield from ((kind, name, tensor) for name, tensor in weights)
+
+
+def tries_of(inputs: Mapping[str, Role]) -> list[dict[str, AnyArray]]:
+    """All defaults; then every input at its other values, together, as many times as the richest has some."""
+    most = max((len(role.samples) for role in inputs.values()), default=1)
+    return [{name: role.samples[i % len(role.samples)] for name, role in inputs.items()} for i in range(most)]
+
+
+def said(values: Values, tries: Sequence[Values]) -> str:
+    """Which of the tries it was."""
+    if values is tries[0]:
+        return "at its inputs' defaults"
+    shown = (
+        f"{name} = {' '.join(f'{x:.3g}' for x in x.reshape(-1)[:3])}{' ...' * (x.size > 3)}"
+        for name, x in values.items()
+    )
+    return f"with {', '.join(shown)}"
+
+
+def tried(
+    module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, n_max: int | None, torch: Any
+) -> tuple[list[dict[str, AnyArray]], list[list[AnyArray]]]:
+    """Values of the inputs, and what the module writes with each. Raises argument/value where it does not take them or
+    does not repeat itself, contract/violation where no file of it could keep the contract."""
+    wrapped, tries = wrapped_module(module, inputs, layout, batched, torch), tries_of(inputs)
+    written: list[list[AnyArray]] = []
+    for values in [*tries, tries[0]]:
+        try:
+            written.append(in_torch(wrapped, values, torch))
+        except ExportError:
+            raise
+        except Exception as error:  # whatever the module says of what it is given
+            if values is tries[0]:
+                remedy = next(_remedies(module, inputs, layout, batched, torch))
+            else:
+                remedy = "narrow the ranges of its inputs, or mend what it says"
+            shapes = ", ".join(f"{n} {[1, *r.shape] if batched else list(r.shape)}" for n, r in inputs.items())
+            raise ExportError(
+                "argument/value",
+                where=f"module {type(module).__name__}, given {shapes}, {said(values, tries)}",
+                expected="tensors",
+                found=f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}",
+                remedy=remedy,
+            ) from error
+    expected, again = written[:-1], written[-1]
+    for values, tensors in zip(tries, expected, strict=True):
+        faults, attributes = read(layout.json(), dict(zip(layout.outputs, tensors, strict=True)), n_max)
+        # Numbers elsewhere than at defaults are checked in the file, where people can go.
+        for fault in [*faults, *(value_faults(attributes) if values is tries[0] else [])]:
+            raise fault.error(f" of the module, {said(values, tries)}")
+    for name, tensor, other in zip(layout.outputs, expected[0], again, strict=True):
+        if (apart := difference(other, tensor)) > 1e-5:
+            raise ExportError(
+                "argument/value",
+                where=f"output {name} of the module, run twice at its inputs' defaults",
+                expected="the same numbers for equal inputs",
+                found=f"a difference of {apart:.1e}: random numbers (torch.randn, dropout), or something that it keeps",
+                remedy="make random numbers once, in __init__, and keep them with register_buffer",
+            )
+    rows = [len(tensors[0]) for tensors in expected]
+    if layout.kind != "image" and n_max is None and len(set(rows)) > 1:
+        at = next(i for i, count in enumerate(rows) if count != rows[0])
+        raise ExportError(
+            "argument/value",
+            where=f"output {layout.outputs[0]} of the module",
+            expected="as many rows for every input",
+            found=f"{rows[0]} {said(tries[0], tries)}, {rows[at]} {said(tries[at], tries)}",
+            remedy="keep every row, and write opacity 0 into the dead ones, which is faster; or give the most that"
+            f" there can be, such as n_max={2 * max(rows)}",
+        )
+    return tries, expected
+
+
+def difference(mine: AnyArray, theirs: AnyArray) -> float:
+    """The largest, as a share of the largest number in `theirs`."""
+    mine, theirs = np.asarray(mine, np.float64), np.asarray(theirs, np.float64)
+    if mine.shape != theirs.shape:
+        return float("inf")
+    both = ~(np.isfinite(mine) | np.isfinite(theirs))
+    apart = np.where(both, 0, np.abs(mine - theirs))
+    scale = max(float(np.abs(theirs[np.isfinite(theirs)]).max(initial=0)), 1e-12)
+    # A number that one has and the other has not.
+    return float(np.nan_to_num(apart, nan=np.inf, posinf=np.inf).max(initial=0)) / scale
+
+
+def told_difference(mine: AnyArray, theirs: AnyArray) -> str:
+    """What is found where it is too large, for people."""
+    if mine.shape != theirs.shape:
+        found = f"is {list(mine.shape)} where the module writes {list(theirs.shape)}"
+        return f"{found}: a number of rows was baked in, by .item() or int(); keep every row, and write opacity 0"
+    lost = int((np.isfinite(theirs) & ~np.isfinite(mine)).sum())
+    if lost:
+        return f"has {lost:,} of {mine.size:,} numbers that are not finite, where the module's are"
+    return f"differs by {difference(mine, theirs):.1e} of its largest number"
+
+
+def _remedies(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, torch: Any) -> Iterator[str]:
+    """What it does run with, the smallest change first; else what may be wrong with its weights."""
+    forms: list[tuple[str, bool] | None] = [None]
+    if any(role.binding["role"] == "pose" for role in inputs.values()):
+        forms += itertools.product(("matrix", "quaternion", "axis-angle"), (False, True))
+    options = itertools.product((not batched, batched), (False, True), forms)
+    for batch, scalar, form in sorted(options, key=lambda o: (o[0] != batched) + o[1] + (o[2] is not None)):
+        if (batch, scalar, form) == (batched, False, None):
+            continue
+        changed = {name: _changed(role, scalar, form) for name, role in inputs.items()}
+        wrapped = wrapped_module(module, changed, layout, batch, torch)
+        try:
+            tensors = in_torch(wrapped, tries_of(changed)[0], torch)
+        except Exception:  # it does not take these either
+            continue
+        if read(layout.json(), dict(zip(layout.outputs, tensors, strict=True)))[0]:
+            continue
+        said = [f"batched={batch}"] if batch != batched else []
+        said += ["shape=() for each time and control"] if scalar else []
+        said += [f'pose(..., format="{form[0]}"{", flat=True" * form[1]})'] if form else []
+        yield f"give {' and '.join(said)}: it runs with that"
+    for kind, name, tensor in weights_of(module):
+        if tensor.is_floating_point() and tensor.dtype != torch.float32:
+            yield f"its {kind} {name} is {str(tensor.dtype).removeprefix('torch.')}: call module.float()"
+    yield "make forward take these shapes; time(shape=...), control(shape=...) and pose(format=...) say others"
+
+
+def _changed(role: Role, scalar: bool, form: Any) -> Role:
+    binding: Any = role.binding
+    if scalar and binding["role"] == "time":
+        return time(binding["_duration"], binding["unit"] == "normalized", ())
+    if scalar and binding["role"] == "control" and role.default.size == 1:
+        return control(*binding["range"], shape=())
+    if form is None or binding["role"] != "pose" or binding["format"] == "parameters":
+        return role
+    numbers = {"axis-angle": 3, "quaternion": 4, "matrix": 9}[binding["format"]]
+    return pose(role.default.size // numbers, format=form[0], flat=form[1])
