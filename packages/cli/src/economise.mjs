@@ -28,7 +28,7 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [opt
 
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --max-mb MB     instead of it: the most accurate file of at most this size
-  --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to some 40 dB) or .ply
+  --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to 40 to 50 dB) or .ply
                   FOLDER/lod-meta.json: streamed SOG, the same in files by level of detail, in an empty folder or one that does not exist yet
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
@@ -217,8 +217,9 @@ async function main({
   // What is left of it when the device is there.
   const read = seconds() - opened;
   const views = ownViews ?? dealtViewsAround(boundsOf(cloud), { scored });
-  const measuring = await GpuEvaluator.create(device, cloud, views, { pool });
   const say = (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`);
+  const onScored = (done, all) => say(`scored in ${done} of ${all} views`);
+  const measuring = await GpuEvaluator.create(device, cloud, views, { pool, onScored });
   const mostError = 10 ** (-asked / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
   const merging = { views: views.scored, mostError, pool };
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;

@@ -57,7 +57,7 @@ async function writeSingle() {
 
 function parseOptions() {
   const flag = { type: 'boolean', default: false };
-  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag };
+  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag, help: flag };
   let parsed;
   try {
     parsed = parseArgs({ allowPositionals: true, options });
@@ -65,6 +65,10 @@ function parseOptions() {
     stop(`${error.message}. ${USAGE}`);
   }
   const { values, positionals } = parsed;
+  if (values.help) {
+    console.log(`usage: ${USAGE}`);
+    process.exit(0);
+  }
   if (positionals.length !== 2) stop(`A scene and a folder are needed: ${USAGE}`);
   // npm runs scripts in the repository's root, wherever it was called.
   const [scene, folder] = positionals.map((path) => resolve(process.env.INIT_CWD ?? '.', path));

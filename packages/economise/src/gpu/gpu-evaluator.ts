@@ -24,6 +24,8 @@ export interface GpuEvaluatorOptions {
   readonly viewsAtOnce?: number;
   /** Takes what stays out of the cloud, in parts; default {@link inline}. */
   readonly pool?: TaskPool;
+  /** Hears how many of the views have scored splats. */
+  readonly onScored?: (views: number, all: number) => void;
 }
 
 /** Exact, so that no rounding is taken for an effect of the cut. */
@@ -49,6 +51,7 @@ export class GpuEvaluator implements Evaluator {
   readonly #renderer: Renderer;
   readonly #cutScene: CutScene;
   readonly #pool: TaskPool;
+  readonly #onScored: GpuEvaluatorOptions['onScored'];
   readonly #errors = new Map<JudgedViews, PictureErrors>();
   #ranking: Ranking | undefined;
   /** All splats, the most seen first: a thread finds it meanwhile. Undefined where there is none. */
@@ -61,6 +64,7 @@ export class GpuEvaluator implements Evaluator {
     scene: SceneParts,
     cutScene: CutScene,
     pool: TaskPool,
+    onScored: GpuEvaluatorOptions['onScored'],
   ) {
     this.#device = device;
     this.#cloud = cloud;
@@ -68,6 +72,7 @@ export class GpuEvaluator implements Evaluator {
     this.#scene = scene;
     this.#cutScene = cutScene;
     this.#pool = pool;
+    this.#onScored = onScored;
     this.#renderer = new Renderer(device, QUALITY);
   }
 
@@ -86,12 +91,12 @@ export class GpuEvaluator implements Evaluator {
     device: GPUDevice,
     cloud: GaussianCloud,
     views: DealtViews,
-    { partSplats, viewsAtOnce = VIEWS_AT_ONCE, pool = inline }: GpuEvaluatorOptions = {},
+    { partSplats, viewsAtOnce = VIEWS_AT_ONCE, pool = inline, onScored }: GpuEvaluatorOptions = {},
   ): Promise<GpuEvaluator> {
     const energies = Math.min(views.scored.length, viewsAtOnce);
     const scene = await SceneParts.upload(device, cloud, energies, partSplats);
     try {
-      return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene), pool);
+      return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene), pool, onScored);
     } catch (error) {
       scene.destroy();
       throw error;
@@ -102,7 +107,7 @@ export class GpuEvaluator implements Evaluator {
     if (this.#ranking) return this.#ranking;
     const scorer = new SceneScorer(this.#device, this.#renderer, this.#scene, this.#views.scored);
     try {
-      await scorer.run(signal);
+      await scorer.run(signal, this.#onScored);
       const parts = this.#scene.parts.map(({ scores, page }) => ({
         buffer: scores,
         byteLength: layouts.Score.size * page.count,

@@ -65,10 +65,10 @@ export class SceneScorer {
   }
 
   /** Scores all splats, and finds their colours at lower degrees. */
-  async run(signal?: AbortSignal): Promise<void> {
+  async run(signal?: AbortSignal, onScored?: (views: number, all: number) => void): Promise<void> {
     await this.#rehearse(signal);
     for (let tries = 0; tries < MOST_TRIES; tries++) {
-      if (await this.#look(signal)) break;
+      if (await this.#look(signal, onScored)) break;
     }
     this.#lower();
   }
@@ -105,7 +105,7 @@ export class SceneScorer {
   }
 
   /** @returns whether there was room for all that each view should show; if not, there will be */
-  async #look(signal: AbortSignal | undefined): Promise<boolean> {
+  async #look(signal: AbortSignal | undefined, onScored?: (views: number, all: number) => void): Promise<boolean> {
     const uniforms = this.#writeViews();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.clear' });
     encoder.clearBuffer(this.#peaks);
@@ -123,6 +123,7 @@ export class SceneScorer {
       this.#gather(k - (k % this.#scene.views), k + 1);
       // The renderer's own looks at what a frame took come back meanwhile.
       await this.#device.queue.onSubmittedWorkDone();
+      onScored?.(k + 1, this.#views.length);
     }
     const [counts] = await readBack(this.#device, [{ buffer: this.#counts }]);
     this.#memory.free(uniforms);
