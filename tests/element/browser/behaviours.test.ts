@@ -302,8 +302,17 @@ describe('fly', () => {
       ...{ 'interpolation-decay': '60', 'disable-tap': '' },
     });
     element.focus();
-    await sendKeys({ press: 'w' });
-    await until(() => eyeOf(element)[2] < 9.999, 'the way ahead');
+    // The code for it may still be on its way: a press before that goes nowhere.
+    let pressedAt = -Infinity;
+    const isAhead = (): boolean => {
+      const [now, is] = [performance.now(), eyeOf(element)[2] < 9.999];
+      if (!is && now - pressedAt > 1000) {
+        pressedAt = now;
+        void sendKeys({ press: 'w' });
+      }
+      return is;
+    };
+    await until(isAhead, 'the way ahead');
     await atRest(element);
     const ahead = eyeOf(element);
     assert(Math.abs(ahead[0]) < 1e-9 && Math.abs(ahead[1]) < 1e-9, `straight on: ${ahead.join()}`);
