@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
 import { QueueClock, type WorkTime } from '@gaussian-splat/renderer';
+import { GlClock } from '@gaussian-splat/renderer/webgl';
 import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
 import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import { LEVELS } from '../support/pace-gpu.js';
@@ -22,7 +23,8 @@ class Page {
 
   constructor(context: TestContext) {
     context.mock.method(performance, 'now', () => this.now);
-    context.mock.method(globalThis, 'setTimeout', ((run: () => void, ms = 0) => this.#after(ms, run)) as never);
+    context.mock.method(globalThis, 'setTimeout', ((run: () => void, ms = 0) =>
+      this.#after(Math.max(1, ms), run)) as never);
     context.mock.method(globalThis, 'clearTimeout', ((id: number) => {
       this.#tasks = this.#tasks.filter((task) => task.id !== id);
     }) as never);
@@ -40,6 +42,16 @@ class Page {
         }),
     },
   } as unknown as GPUDevice;
+
+  /** A fence stands behind all that was drawn until then; pages ask whether it was reached. */
+  readonly gl = {
+    SIGNALED: 1,
+    fenceSync: () => this.#free + BACK,
+    flush: () => undefined,
+    isContextLost: () => false,
+    getSyncParameter: (reached: number) => (this.now >= reached ? 1 : 0),
+    deleteSync: () => undefined,
+  } as unknown as WebGL2RenderingContext;
 
   /** Submits so much work, ms, at which the browser looks for so long first. */
   work(milliseconds: number, looks = 0): void {
@@ -106,6 +118,24 @@ test('a frame takes what its work takes: alone, behind others, and behind the wo
       Math.abs(atLeast - expected[k]) < 0.1 && Math.abs(atMost - expected[k]) < 0.1,
       `${k}: ${atLeast} ${atMost}`,
     );
+  });
+});
+
+test('the clock of WebGL: frames that are drawn before the last is done take what their own work takes', async (context) => {
+  const page = new Page(context);
+  const clock = new GlClock(page.gl);
+  const times: WorkTime[] = [];
+  const expected = [20, 40, 40, 40, 40, 10];
+  for (const ms of expected) {
+    void clock.time(() => page.work(ms)).then((time) => void times.push(time));
+    await page.until(page.now + INTERVAL);
+  }
+  await page.until(page.now + 300);
+  assert.equal(times.length, expected.length);
+  times.forEach(({ atLeast, atMost }, k) => {
+    // What waiting for nothing takes is not taken off, and pages ask once a millisecond.
+    const [least, most] = [expected[k] - 2, expected[k] + THERE + BACK + 2];
+    assert.ok(atLeast >= least && atMost <= most, `${k}: ${atLeast} to ${atMost}, not ${expected[k]} ms`);
   });
 });
 

@@ -43,8 +43,9 @@ export class GlClock {
     draw();
     // Where the browser draws at once, nothing else could be done meanwhile.
     const busy = performance.now() - begin;
-    const before = this.#last;
     const told = await drawn(this.#gl);
+    // Of the frame before, which may have been drawn, but not done, when this one was.
+    const before = this.#last;
     this.#last = told;
     const atMost = told.now - Math.max(begin, before.since);
     const atLeast = Math.min(atMost, Math.max(least, busy, told.since - Math.max(begin, before.now)));
