@@ -124,10 +124,11 @@ describe('a large PLY', () => {
       workers++;
       return new Worker(SCRIPT, { type: 'module' });
     });
-    const element = show({ src: `${FILE}&ms=4000` });
+    const element = show({ src: `${FILE}&gate=early` });
     const start = performance.now();
     await nextEvent(element, 'preview');
     const first = performance.now() - start;
+    void fetch('/net/open/early');
     await element.ready;
     assert(element.loaded, element.error?.message ?? 'loaded');
     console.log(
@@ -136,6 +137,5 @@ describe('a large PLY', () => {
     observer.disconnect();
     assertEqual(element.statistics?.splats, expected.count, 'splats');
     assert(workers > 1, `shared by ${workers} workers, with the limits that every page has`);
-    assert(first < 4_000, `a preview after ${first.toFixed(0)} ms`);
   });
 });

@@ -111,8 +111,8 @@ describe('several scenes in one element', () => {
   it('are live: moved, hidden, shown, dimmed, cut, removed and put elsewhere without loading again', async () => {
     const element = await placeLoaded(`<gaussian-splat src="${GREEN}" ${VIEW}>
       <splat-scene src="${COMPASS}" position="3 0 0"></splat-scene></gaussian-splat>`);
-    // A busy machine may take longer from one place to the next than a removed scene is kept.
-    GaussianSplatElement.releaseDelay = Infinity;
+    // A busy machine may take longer from one place to the next than a removed scene is kept. Another test waits until it has gone.
+    GaussianSplatElement.releaseDelay = 30_000;
     const [child] = childrenOf(element);
     let loads = 0;
     child.addEventListener('loadstart', () => loads++);

@@ -33,14 +33,20 @@ export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false):
     },
     tune: async (whole, measure, target) => {
       if (encodeWebp === undefined) throw withoutWebp();
-      const { title, options } = await tuned(whole, measure, target, encodeWebp);
-      return {
-        title: `${isStreamed ? 'streamed ' : ''}${title}`,
-        hasOneDegree: true,
-        write: async ({ cloud }) =>
-          isStreamed ? writeZip(await writeStreamedSog(cloud, options)) : writeSog(cloud, options),
-      };
+      return sogOf(await tuned(whole, measure, target, encodeWebp), isStreamed);
     },
+  };
+}
+
+function sogOf(options: SogOptions & { readonly steps: SogSteps }, isStreamed: boolean): Encoding {
+  const { steps, palette } = options;
+  const lengths = Object.entries(steps).map(([name, step]) => `${name} ${step.toPrecision(2)}`);
+  return {
+    title: `${isStreamed ? 'streamed ' : ''}SOG version 2, steps ${lengths.join(', ')}${palette > 0 ? `, palette ${palette}` : ''}`,
+    hasOneDegree: true,
+    write: async ({ cloud }) =>
+      isStreamed ? writeZip(await writeStreamedSog(cloud, options)) : writeSog(cloud, options),
+    coarser: (factor) => sogOf({ ...options, steps: scaledSteps(steps, factor) }, isStreamed),
   };
 }
 
@@ -49,7 +55,7 @@ async function tuned(
   measure: Measure,
   target: number,
   encodeWebp: EncodeWebp,
-): Promise<{ title: string; options: SogOptions }> {
+): Promise<SogOptions & { readonly steps: SogSteps }> {
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
     measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK }));
   let palette = PALETTES[0];
@@ -72,12 +78,7 @@ async function tuned(
     const own = Math.max(error - (target - share), 0.1 * error);
     steps = scaledSteps(steps, Math.min(3, Math.max(1 / 3, Math.sqrt((0.95 * share) / own))));
   }
-  return {
-    title: `SOG version 2, steps ${Object.entries(steps)
-      .map(([name, step]) => `${name} ${step.toPrecision(2)}`)
-      .join(', ')}${cloud.shDegree > 0 ? `, palette ${palette}` : ''}`,
-    options: { steps, palette, encodeWebp },
-  };
+  return { steps, palette: cloud.shDegree > 0 ? palette : 0, encodeWebp };
 }
 
 const withoutWebp = (): GaussianSplatError =>
