@@ -149,12 +149,16 @@ async function coarsest(
   target: number,
   write: (encoding: Encoding) => Promise<Written>,
 ): Promise<Written> {
+  const { coarser } = first.encoding;
   let best = first;
-  for (let tries = 0; tries < COARSER_TRIES && best.encoding.coarser && target > ENOUGH_ROOM * best.error; tries++) {
-    // As if all of the error were rounding: what comes stays below what is asked.
-    const next = await write(best.encoding.coarser(Math.sqrt(target / best.error)));
-    if (next.error > target || next.bytes.length >= best.bytes.length) break;
-    best = next;
+  // As if all of the error were rounding. Errors grow in jumps where steps are few.
+  let [fits, fails, next] = [1, Infinity, Math.sqrt(target / first.error)];
+  for (let tries = 0; tries < COARSER_TRIES && coarser && target > ENOUGH_ROOM * best.error; tries++) {
+    const written = await write(coarser(next));
+    if (written.error <= target && written.bytes.length >= best.bytes.length) break;
+    if (written.error <= target) [best, fits] = [written, next];
+    else fails = next;
+    next = Math.min(fits * Math.sqrt(target / best.error), Math.sqrt(fits * fails));
   }
   return best;
 }
