@@ -68,8 +68,6 @@ const ROUNDING_SHARE = 0.6;
 /** How much less is taken where the written file misses the figure; the next time as much less again than that. The last try keeps everything. */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
-/** How often steps are made longer at the end, and by how many times an error must be below what is asked: a tenth of a dB. */
-const [COARSER_TRIES, ENOUGH_ROOM] = [4, 1.025];
 const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
@@ -107,60 +105,25 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   }
   for (let tries = 1; ; tries++) {
     const { cut, reduced } = ready ?? (await cutCloud(plan, evaluator, budget, signal));
-    const write = async (way: Encoding): Promise<Written> => {
-      const bytes = await way.write(reduced, pool);
-      const written = await readInParts(bytes, { name: options.name, signal }, pool);
-      watch.lap('write');
-      const errors = await evaluator.compare(written, 'heldOut', signal);
-      watch.lap('judge');
-      const error = errorTogether(errors, 'heldOut');
-      onStep(`held-out views: ${decibels(error).toFixed(2)} dB`);
-      return { encoding: way, bytes, errors, error };
-    };
-    const first = await write(encoding);
-    if (first.error <= target) {
-      const { bytes, errors, encoding: last } = await coarsest(first, target, write);
+    const bytes = await encoding.write(reduced, pool);
+    const written = await readInParts(bytes, { name: options.name, signal }, pool);
+    watch.lap('write');
+    const errors = await evaluator.compare(written, 'heldOut', signal);
+    watch.lap('judge');
+    const error = errorTogether(errors, 'heldOut');
+    onStep(`held-out views: ${decibels(error).toFixed(2)} dB`);
+    if (error <= target)
       return {
         ...summary(cloud, reduced, cut, errors),
         bytes: unshared(bytes),
-        encoding: last.title,
+        encoding: encoding.title,
         seconds: watch.seconds,
       };
-    }
-    const { error } = first;
     if (plan === WHOLE) throw unreachable(options, atMost(error));
     const isLast = tries + 1 >= MAX_TRIES || plan.filling === 0;
     plan = isLast ? WHOLE : { ...plan, filling: SHRINK ** tries * plan.filling };
     ready = undefined;
   }
-}
-
-/** A file, and what its held-out views lack, mean squared errors. */
-interface Written {
-  readonly encoding: Encoding;
-  readonly bytes: Uint8Array;
-  readonly errors: readonly number[];
-  readonly error: number;
-}
-
-/** The same splats in steps as long as the held-out views allow: what searched views ask for leaves some tenths of a dB. */
-async function coarsest(
-  first: Written,
-  target: number,
-  write: (encoding: Encoding) => Promise<Written>,
-): Promise<Written> {
-  const { coarser } = first.encoding;
-  let best = first;
-  // As if all of the error were rounding. Errors grow in jumps where steps are few.
-  let [fits, fails, next] = [1, Infinity, Math.sqrt(target / first.error)];
-  for (let tries = 0; tries < COARSER_TRIES && coarser && target > ENOUGH_ROOM * best.error; tries++) {
-    const written = await write(coarser(next));
-    if (written.error <= target && written.bytes.length >= best.bytes.length) break;
-    if (written.error <= target) [best, fits] = [written, next];
-    else fails = next;
-    next = Math.min(fits * Math.sqrt(target / best.error), Math.sqrt(fits * fails));
-  }
-  return best;
 }
 
 /** The smallest way to write the scene whose rounding leaves room for more. Where there is but one, the written file alone is judged. */

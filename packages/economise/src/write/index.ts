@@ -25,8 +25,6 @@ export interface Encoding {
    * @param measure says how much it is, a mean squared error
    */
   readonly tune?: (whole: WrittenCloud, measure: Measure, target: number) => Promise<Encoding>;
-  /** The same in steps so many times as long. */
-  readonly coarser?: (factor: number) => Encoding;
 }
 
 /** Says how far a written file is from the scene: a mean squared error, peak 1. */

@@ -33,20 +33,14 @@ export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false):
     },
     tune: async (whole, measure, target) => {
       if (encodeWebp === undefined) throw withoutWebp();
-      return sogOf(await tuned(whole, measure, target, encodeWebp), isStreamed);
+      const { title, options } = await tuned(whole, measure, target, encodeWebp);
+      return {
+        title: `${isStreamed ? 'streamed ' : ''}${title}`,
+        hasOneDegree: true,
+        write: async ({ cloud }) =>
+          isStreamed ? writeZip(await writeStreamedSog(cloud, options)) : writeSog(cloud, options),
+      };
     },
-  };
-}
-
-function sogOf(options: SogOptions & { readonly steps: SogSteps }, isStreamed: boolean): Encoding {
-  const { steps, palette } = options;
-  const lengths = Object.entries(steps).map(([name, step]) => `${name} ${step.toPrecision(2)}`);
-  return {
-    title: `${isStreamed ? 'streamed ' : ''}SOG version 2, steps ${lengths.join(', ')}${palette > 0 ? `, palette ${palette}` : ''}`,
-    hasOneDegree: true,
-    write: async ({ cloud }) =>
-      isStreamed ? writeZip(await writeStreamedSog(cloud, options)) : writeSog(cloud, options),
-    coarser: (factor) => sogOf({ ...options, steps: scaledSteps(steps, factor) }, isStreamed),
   };
 }
 
@@ -55,7 +49,7 @@ async function tuned(
   measure: Measure,
   target: number,
   encodeWebp: EncodeWebp,
-): Promise<SogOptions & { readonly steps: SogSteps }> {
+): Promise<{ title: string; options: SogOptions }> {
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
     measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK }));
   let palette = PALETTES[0];
@@ -78,7 +72,12 @@ async function tuned(
     const own = Math.max(error - (target - share), 0.1 * error);
     steps = scaledSteps(steps, Math.min(3, Math.max(1 / 3, Math.sqrt((0.95 * share) / own))));
   }
-  return { steps, palette: cloud.shDegree > 0 ? palette : 0, encodeWebp };
+  return {
+    title: `SOG version 2, steps ${Object.entries(steps)
+      .map(([name, step]) => `${name} ${step.toPrecision(2)}`)
+      .join(', ')}${cloud.shDegree > 0 ? `, palette ${palette}` : ''}`,
+    options: { steps, palette, encodeWebp },
+  };
 }
 
 const withoutWebp = (): GaussianSplatError =>
