@@ -1,4 +1,4 @@
-/** Errors of whole scenes, of whatever format. */
+/** Errors of whole scenes, of any format. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 

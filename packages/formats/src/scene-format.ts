@@ -32,7 +32,7 @@ export interface SceneSource {
 /** Smaller scenes are read as fast as a preview would be. */
 const MIN_PREVIEWED = 50_000;
 
-/** True if somebody wants a preview of a scene of so many splats, and the scene is large enough for one to be worth its time. */
+/** True if a preview was asked for, and a scene of `count` splats is large enough for one to be worth its time. */
 export function previewWanted({ onPreview }: SceneSource, count: number): boolean {
   return onPreview !== undefined && count >= MIN_PREVIEWED;
 }

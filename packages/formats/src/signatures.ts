@@ -42,7 +42,7 @@ export function looksLikeKsplat(bytes: Uint8Array): boolean {
   return sections >= 1 && sections <= maxSections && splats <= maxSplats && view.getUint16(20, true) <= 2;
 }
 
-/** Larger files are no manifest of a sequence, whatever they begin with. */
+/** Larger files are no manifest of a sequence. */
 export const MAX_MANIFEST_BYTES = 1 << 24;
 
 /** True if a file is the manifest of a sequence. */

@@ -145,6 +145,9 @@ describe('what models take, told to the page', () => {
     y.dispatchEvent(new Event('input'));
     const pose = element.pose as readonly number[];
     assert(Math.abs(pose[0]) < 0.02 && Math.abs(pose[1] + 1) < 0.02, `still turned: ${pose.slice(0, 9).join(' ')}`);
+    element.shadowRoot!.querySelector<HTMLElement>('[part=controls-panel] button')!.click();
+    assertEqual(element.pose, element.getAttribute('pose'), 'back to what the page gave');
+    await shows(['0.0', '0.0', '1.6'], -3);
     element.pose = null;
     await shows(['0.0', '0.0', '0.0'], -3);
   });

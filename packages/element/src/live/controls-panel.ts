@@ -51,6 +51,8 @@ interface Owner extends HTMLElement, Pick<ReactiveElement, 'addController'> {
   pose: Numbers | null;
 }
 
+type Pose = Numbers | null | undefined;
+
 /** What the panel sees of its element. */
 interface PanelHost extends Owner {
   readonly controlsPanel: boolean;
@@ -66,8 +68,8 @@ export class ControlsPanel {
   readonly #element: PanelHost;
   readonly #strings: SpokenStrings;
   readonly #box: HTMLElement;
-  /** Those with rotations of joints, which people turn as axis-angle. */
-  readonly #turned = new Set<Owner>();
+  /** Of those with rotations of joints, which people turn as axis-angle: the pose that the page has given, and the one that was read or turned last. */
+  readonly #poses = new Map<Owner, { given: Pose; last: Pose }>();
   /** Those whose values it follows. */
   readonly #followed = new WeakSet<Owner>();
   /** Each shows the value that its control has by now. */
@@ -103,7 +105,6 @@ export class ControlsPanel {
     const told = JSON.stringify(owners.map((owner) => [this.#titleOf(owner), owner.inputs]));
     if (told === this.#told || this.#box.hidden) return;
     this.#told = told;
-    this.#turned.clear();
     this.#followers = [];
     for (const owner of owners) {
       // What a page sets is shown, too.
@@ -196,15 +197,19 @@ export class ControlsPanel {
     if (perJoint === 0) return [];
     const count = size / perJoint;
     const none = new Array<number>(3 * count).fill(0);
-    let [turns, posed]: [number[], Numbers | null | undefined] = [[...none], undefined];
+    const pose = this.#poses.get(owner) ?? { given: owner.pose, last: owner.pose };
+    this.#poses.set(owner, pose);
+    const turnsNow = (): number[] => {
+      const numbers = readNumbers(owner.pose);
+      return numbers?.length === size ? turnsOf(numbers, input) : [...none];
+    };
+    let turns = turnsNow();
     /** As the page has set them, or as they were turned here: whole turns do not come back from a pose. */
     const read = (): number[] => {
-      if (owner.pose === posed) return turns;
-      posed = owner.pose;
-      const numbers = readNumbers(posed);
-      return (turns = numbers?.length === size ? turnsOf(numbers, input) : [...none]);
+      if (owner.pose === pose.last) return turns;
+      pose.given = pose.last = owner.pose;
+      return (turns = turnsNow());
     };
-    this.#turned.add(owner);
     const choice = make('select', { part: 'control-input' });
     choice.append(
       ...Array.from({ length: count }, (_, i) =>
@@ -220,7 +225,7 @@ export class ControlsPanel {
         () => read()[place()],
         (value) => {
           read()[place()] = value;
-          owner.pose = posed = poseOf(turns, input);
+          owner.pose = pose.last = poseOf(turns, input);
         },
       );
     });
@@ -242,7 +247,8 @@ export class ControlsPanel {
       const names = owner.inputs.map(({ name }) => name);
       const others = Object.entries(owner.controls ?? {}).filter(([name]) => !names.includes(name));
       owner.controls = others.length > 0 ? Object.fromEntries(others) : null;
-      if (this.#turned.has(owner)) owner.pose = null;
+      const pose = this.#poses.get(owner);
+      if (pose) owner.pose = pose.last = pose.given ?? null;
     }
     this.#told = '';
     this.#update();

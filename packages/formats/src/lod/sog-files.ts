@@ -167,7 +167,7 @@ export function cut(cloud: GaussianCloud, run: SogRun, budget?: LoadBudget): Gau
   };
 }
 
-/** Lets so many in at a time, in the order in which they came. */
+/** Lets a fixed number in at a time, in the order in which they came. */
 class Gate {
   #free: number;
   readonly #queue: (() => void)[] = [];
