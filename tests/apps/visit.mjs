@@ -81,7 +81,8 @@ async function open(page, address) {
     try {
       return await page.goto(address, { timeout: MOST_MS });
     } catch (error) {
-      if (!/ERR_CONNECTION_REFUSED/.test(error.message) || Date.now() > end) throw error;
+      // The browser's own page for a server that does not answer yet may come in between.
+      if (!/ERR_CONNECTION_REFUSED|chrome-error:/.test(error.message) || Date.now() > end) throw error;
       await new Promise((resolve) => setTimeout(resolve, 300));
     }
   }
