@@ -1,7 +1,7 @@
 /** Scores, cuts and errors on the GPU, against those of plain code. Parts of 256 splats, so that a scene has several. */
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, eyeOf, type GaussianCloud } from '@gaussian-splat/core';
 import {
   dealtViewsAround,
   decibels,
@@ -18,6 +18,7 @@ import {
 import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { basisOf } from '../support/seen-from.js';
 import { type ContributionScorer, cpuScorer, PaintedEvaluator, scoreSplats, Studio } from './twin/index.js';
 
 const SIZE = { width: 64, height: 48 };
@@ -67,6 +68,29 @@ function apart(found: ArrayLike<number>, expected: ArrayLike<number>): number {
   }
   return most / largest;
 }
+
+test('how splats are seen: energies are means over the views, and roots those of the moments of what each view saw', async () => {
+  const { energies, roots } = await evaluator.seen();
+  const own = await Promise.all(views.scored.map((_, v) => evaluator.energiesIn(v)));
+  const means = energies.map((_, i) => own.reduce((sum, energy) => sum + energy[i], 0) / own.length);
+  assert.ok(apart(energies, means) < 1e-5);
+  for (const i of [0, 1, 300, 577, COUNT - 1]) {
+    const root = roots.subarray(136 * i, 136 * (i + 1));
+    const squares = views.scored.map(({ worldToCamera }, v) => {
+      const eye = eyeOf(worldToCamera);
+      const d = eye.map((x, axis) => scene.positions[3 * i + axis] - x);
+      return { weight: own[v][i] / (own.length * energies[i]), basis: basisOf(d.map((x) => x / Math.hypot(...d))) };
+    });
+    for (let r = 0; r < 9; r++) {
+      for (let c = 0; c <= r; c++) {
+        const moment = squares.reduce((sum, { weight, basis }) => sum + weight * basis[r] * basis[c], 0);
+        let found = r === c ? -0.1 / (4 * Math.PI) : 0;
+        for (let j = 0; j <= c; j++) found += root[(r * (r + 1)) / 2 + j] * root[(c * (c + 1)) / 2 + j];
+        assert.ok(Math.abs(found - moment) < 1e-3, `splat ${i}, row ${r}, column ${c}: ${found}, not ${moment}`);
+      }
+    }
+  }
+});
 
 test('sums, colours and errors are those of plain code from the same contributions', async () => {
   const given: ContributionScorer = async (camera) => {

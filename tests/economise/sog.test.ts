@@ -12,6 +12,7 @@ import {
 } from '@gaussian-splat/economise';
 import { readLodScene, readScene } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer';
+import { basisOf, cone, rootOf } from '../support/seen-from.js';
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { randomSource } from '../support/gpu.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -68,6 +69,31 @@ test('coarser steps and smaller palettes make smaller files, and a flag for anti
   assert.ok(rough.length < 0.75 * fine.length, `${rough.length} of ${fine.length}`);
   assert.ok(few.length < fine.length, `${few.length} of ${fine.length}`);
   assert.equal((await read(rough)).antialiased, true);
+});
+
+test('where it is known how splats are seen, what they show from there is nearer with the same palette', async () => {
+  const cloud = ofKinds(2_000, 2, 500);
+  const random = randomSource(5);
+  const [root, others] = [rootOf(cone(64, random)), cone(64, random).map(basisOf)];
+  const roots = Float32Array.from({ length: 45 * cloud.count }, (_, k) => root[k % 45]);
+  // Every fourth is in plain sight.
+  const energies = Float32Array.from({ length: cloud.count }, (_, i) => (i % 4 === 0 ? 1 : 0.01) * 1e-4);
+  const order = packedOrder(cloud);
+  const [plain, fitting] = await Promise.all(
+    [undefined, { energies, roots }].map(async (seen) => {
+      const found = await read(await writeSog(cloud, { steps: FINEST, palette: 64, encodeWebp, effort: 0, seen }));
+      let error = 0;
+      order.forEach((i, k) => {
+        for (const basis of others) {
+          const added = basis.reduce((sum, y, j) => sum + y * (found.sh[27 * k + 3 * j] - cloud.sh[27 * i + 3 * j]), 0);
+          error += energies[i] * added ** 2;
+        }
+      });
+      return error;
+    }),
+  );
+  console.log(`error as seen ${(fitting / plain).toFixed(2)} of that without`);
+  assert.ok(fitting < 0.6 * plain, `${fitting} and ${plain}`);
 });
 
 test('each step makes as much of the error as it has numbers, whatever errors are', async () => {

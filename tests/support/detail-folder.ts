@@ -35,7 +35,7 @@ export function detailFolder(
 ): DetailFolder {
   const coding = coded && codingOf(coded.steps);
   const write = (from: DetailTree) => {
-    const encoder = coding && new PageEncoder(from, coding, coded.deflate);
+    const encoder = coding && new PageEncoder(from, coding, coded);
     return (page: BuiltPage): ArrayBuffer => (encoder ? encoder.encode(page) : packPage(from, page)).buffer;
   };
   const tree = buildDetailTree(cloud, options);

@@ -26,6 +26,7 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
   --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/detail-pages.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
   --min-db DB     PSNR to SCENE over the covered pixels of held-out views that the finest pages reach, 30 to 60 (default 50): files are as small as that allows
+  --scored N      views from everywhere that tell how splats are seen, 24 to 2000 (default 216): what shows little of the harmonics is rounded more
   --quantized     pages as the GPU reads them, not compressed: 66 dB and more, in two to three times the bytes
   --exact         the same with centres, shapes and opacities as float32 keeps them, in three to four times the bytes
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
@@ -40,6 +41,7 @@ function parseOptions(args) {
     tile: text,
     spacing: text,
     'min-db': { ...text, default: '50' },
+    scored: { ...text, default: '216' },
     quantized: { type: 'boolean' },
     exact: { type: 'boolean' },
   });
@@ -64,10 +66,14 @@ function parseOptions(args) {
   const minDecibels = Number(values['min-db']);
   if (!(minDecibels >= 30 && minDecibels <= 60))
     throw new UsageError(`--min-db: expected 30 to 60, found "${values['min-db']}"`);
+  const scored = Number(values.scored);
+  if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
+    throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
   return {
     scene,
     out,
     degree,
+    scored,
     geometry: values.exact ? undefined : 'quantized',
     minDecibels: values.exact || values.quantized ? undefined : minDecibels,
     columns: Number(tile[1]),
@@ -124,20 +130,20 @@ async function deviceToMeasure() {
 }
 
 /** How files are coded, and how near to the scene that is; undefined for files that are not. */
-async function chooseCoding({ tree, pages, cloud, minDecibels }) {
+async function chooseCoding({ tree, pages, cloud, minDecibels, scored }) {
   if (minDecibels === undefined) return undefined;
   const device = await deviceToMeasure();
   if (device === undefined) return { coding: codingOf(USUAL_STEPS) };
   const { steps, ...found } = await findSteps({
-    ...{ tree, pages, cloud, device, minDecibels },
+    ...{ tree, pages, cloud, device, minDecibels, scored },
     onStep: (step) => console.log(`  ${step}`),
   });
   return { coding: codingOf(steps), ...found };
 }
 
 /** Writes the pages of a tree and returns what the manifest says of it. */
-function writeTree(out, name, tree, pages, coding) {
-  const encoder = coding && new PageEncoder(tree, coding, deflate);
+function writeTree(out, name, tree, pages, { coding, seen } = {}) {
+  const encoder = coding && new PageEncoder(tree, coding, { deflate, seen });
   const fileOf = (p) => `pages/${name}-${String(p).padStart(5, '0')}.bin`;
   let bytes = 0;
   pages.forEach((page, p) => {
@@ -150,11 +156,11 @@ function writeTree(out, name, tree, pages, coding) {
 }
 
 /** The copies and the tree above them: the pages of the copies are those of one tree. */
-function writeCopies(out, tree, places, coding) {
+function writeCopies(out, tree, places, choice) {
   const above = treeOfCopies(tree, places);
   const abovePages = cutPages(above);
-  const top = writeTree(out, 'top', above, abovePages, coding);
-  const part = writeTree(out, 'part', tree, cutPages(tree, false), coding);
+  const top = writeTree(out, 'top', above, abovePages, { coding: choice?.coding });
+  const part = writeTree(out, 'part', tree, cutPages(tree, false), choice);
   const placeOf = new Map();
   abovePages.forEach(({ holds }, page) =>
     holds.forEach(([level, copy], chunk) => level === 0 && placeOf.set(copy, [page, chunk])),
@@ -185,7 +191,7 @@ function writeFolder(out, writePages) {
   }
 }
 
-async function main({ scene, out, degree, geometry, minDecibels, columns, rows, spacing }) {
+async function main({ scene, out, degree, geometry, minDecibels, scored, columns, rows, spacing }) {
   const openPart = (path) => readWhole(join(dirname(scene), path));
   const cloud = upTo(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
   sayWarnings(scene, cloud);
@@ -195,12 +201,10 @@ async function main({ scene, out, degree, geometry, minDecibels, columns, rows, 
   const isTiled = columns * rows > 1;
   if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
   const places = isTiled ? placesOf(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : [];
-  const choice = await chooseCoding({ tree, pages: cutPages(tree), cloud, minDecibels });
+  const choice = await chooseCoding({ tree, pages: cutPages(tree), cloud, minDecibels, scored });
   const coded = performance.now();
   const { manifest, bytes } = writeFolder(out, () =>
-    isTiled
-      ? writeCopies(out, tree, places, choice?.coding)
-      : writeTree(out, 'scene', tree, cutPages(tree), choice?.coding),
+    isTiled ? writeCopies(out, tree, places, choice) : writeTree(out, 'scene', tree, cutPages(tree), choice),
   );
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
   const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);

@@ -143,7 +143,7 @@ async function chooseEncoding(
   };
   if (tune) {
     options.onStep?.('steps of each attribute');
-    const encoding = await tune(whole, measure, ROUNDING_SHARE * target);
+    const encoding = await tune(whole, measure, ROUNDING_SHARE * target, await options.evaluator.seen?.());
     options.onStep?.(encoding.title);
     return { encoding, rounding: await measure(await encoding.write(whole)) };
   }

@@ -1,4 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
+import type { SeenSplats } from '@gaussian-splat/renderer';
 import type { Cut, ReducedCloud } from './reduce.js';
 import type { Ranking } from './score.js';
 
@@ -19,6 +20,8 @@ export interface CutFigures {
 export interface Evaluator {
   /** Looks at the scene in the scored views. To be called before all else; it draws the scene once. */
   rank(signal?: AbortSignal): Promise<Ranking>;
+  /** How the scored views see the splats, by evaluators that tell; {@link rank} comes before it. */
+  seen?(): Promise<SeenSplats | undefined>;
   /** Figures of a cut, in images of the scene. */
   cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures>;
   /** What a cut leaves, to be written. */

@@ -13,6 +13,7 @@ export {
   dealViews,
   viewsAround,
   viewsBetween,
+  viewsFromEverywhere,
   type DealtViewOptions,
   type DealtViews,
   type ViewOptions,

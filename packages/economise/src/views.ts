@@ -48,6 +48,23 @@ export function viewsAround(bounds: Bounds, count: number, options: ViewOptions 
   });
 }
 
+/** Distances of {@link viewsFromEverywhere}, in radii of the subject: every fifth from within it. */
+const EVERYWHERE = [...DISTANCES, 0.6];
+
+/** Views of a subject from all directions, from below, too, and from within: what no visitor of these sees hardly matters. */
+export function viewsFromEverywhere(bounds: Bounds, count: number, options: ViewOptions = {}): Camera[] {
+  const { center, radius } = bounds;
+  return viewsAround(bounds, count, options).map((view, k) => {
+    const azimuth = 2 * Math.PI * ((0.6180339887 * (k + 0.5)) % 1);
+    const height = 2 * ((0.7548776662 * (k + 0.5)) % 1) - 1;
+    const distance = radius * EVERYWHERE[k % EVERYWHERE.length];
+    const across = Math.sqrt(1 - height * height);
+    const direction = [across * Math.sin(azimuth), -height, -across * Math.cos(azimuth)];
+    const eye = center.map((value, axis) => value + distance * direction[axis]) as [number, number, number];
+    return { ...view, worldToCamera: lookAt(eye, center, [0, -1, 0]) };
+  });
+}
+
 /** Views dealt out by what they are for. */
 export interface DealtViews {
   /** Splats are scored by what they contribute here. */

@@ -30,11 +30,13 @@ export {
   PageEncoder,
   USUAL_STEPS,
   type Deflate,
+  type PageEncoderOptions,
   type PageSteps,
   type WrittenCoding,
 } from './detail/encode-page.js';
 export { cloudOfChunks, type PageChunks } from './detail/page-cloud.js';
 export type { CodedFile, PageCoding } from './detail/page-coding.js';
+export { weighSplats, type SeenSplats } from './detail/seen-splats.js';
 export { treeOfCopies } from './detail/tile-tree.js';
 export { StreamedGaussians, type PoolOptions, type StreamOptions } from './detail/streamed-gaussians.js';
 export type { FetchPage, PageSource, StreamedScene } from './detail/page-source.js';

@@ -26,6 +26,7 @@ export * as splatRows from './detail/splat-rows.js';
 export { BRIDGED, DetailTable } from './detail/detail-table.js';
 export { pageLayout, SLOT_CHUNKS } from './detail/manifest.js';
 export { packQuantizedChunk, QUANTIZED_CHUNK_WORDS } from './detail/quantized-geometry.js';
+export { HarmonicRounder } from './detail/round-harmonics.js';
 export { QUANTIZED } from './detail/quantized-reading.js';
 export { PagePool, poolBytes, poolSize } from './detail/page-pool.js';
 export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './detail/page-traffic.js';

@@ -1,5 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { Renderer } from '@gaussian-splat/renderer';
+import { Renderer, type SeenSplats } from '@gaussian-splat/renderer';
 import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
@@ -16,6 +16,7 @@ import { putLowered } from './put-lowered.js';
 import { readBack } from './read-back.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
+import { seenIn } from './seen-splats.js';
 
 export interface GpuEvaluatorOptions {
   /** Most splats that are bound at once, for tests; default what the device's limits allow. */
@@ -104,6 +105,7 @@ export class GpuEvaluator implements Evaluator {
   }
 
   async rank(signal?: AbortSignal): Promise<Ranking> {
+    signal?.throwIfAborted();
     if (this.#ranking) return this.#ranking;
     const scorer = new SceneScorer(this.#device, this.#renderer, this.#scene, this.#views.scored);
     try {
@@ -139,6 +141,12 @@ export class GpuEvaluator implements Evaluator {
       slot += bytes.byteLength / 4;
     }
     return found;
+  }
+
+  /** How the scored views see the splats: what their attributes may be rounded by. */
+  async seen(): Promise<SeenSplats> {
+    if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before seen()');
+    return seenIn(this.#device, this.#scene, this.#views.scored.length);
   }
 
   async scores(): Promise<Scores> {

@@ -1,4 +1,5 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import type { SeenSplats } from '@gaussian-splat/renderer';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { inline, type TaskPool } from '../parts/task-pool.js';
 import { degreesOf, type Cut, type ReducedCloud } from '../reduce.js';
@@ -62,6 +63,10 @@ export class MergingEvaluator implements Evaluator {
   async reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
     const reduced = await this.#inner.reduce(cut, signal);
     return cut.mergePrice ? applyMerges(reduced, this.#found, cut.mergePrice) : reduced;
+  }
+
+  async seen(): Promise<SeenSplats | undefined> {
+    return this.#inner.seen?.();
   }
 
   compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {

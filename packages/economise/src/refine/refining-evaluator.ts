@@ -1,5 +1,5 @@
 import { GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { Renderer } from '@gaussian-splat/renderer';
+import { Renderer, type SeenSplats } from '@gaussian-splat/renderer';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
 import { PictureErrors } from '../gpu/picture-errors.js';
@@ -59,6 +59,10 @@ export class RefiningEvaluator implements Evaluator {
 
   reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
     return this.#inner.reduce(cut, signal);
+  }
+
+  async seen(): Promise<SeenSplats | undefined> {
+    return this.#inner.seen?.();
   }
 
   compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {

@@ -1,4 +1,5 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import type { SeenSplats } from '@gaussian-splat/renderer';
 import { isOfPlanes } from '@gaussian-splat/renderer/stages';
 import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
@@ -10,7 +11,10 @@ import type { EncodeWebp } from './sog.js';
 import { isLodIndex } from './streamed-sog.js';
 
 /** What is written of a reduced cloud. */
-export type WrittenCloud = Pick<ReducedCloud, 'cloud' | 'degrees'>;
+export interface WrittenCloud extends Pick<ReducedCloud, 'cloud' | 'degrees'> {
+  /** [N] numbers of its splats in the source; default 0 to N - 1. */
+  readonly kept?: Uint32Array;
+}
 
 /** A way to write a scene: how precise, and how. */
 export interface Encoding {
@@ -23,8 +27,9 @@ export interface Encoding {
   /**
    * Chooses how precise it is: such that the rounding of a scene is at most this.
    * @param measure says how much it is, a mean squared error
+   * @param seen how views see the splats of the scene, where that is known
    */
-  readonly tune?: (whole: WrittenCloud, measure: Measure, target: number) => Promise<Encoding>;
+  readonly tune?: (whole: WrittenCloud, measure: Measure, target: number, seen?: SeenSplats) => Promise<Encoding>;
 }
 
 /** Says how far a written file is from the scene: a mean squared error, peak 1. */

@@ -1,5 +1,5 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import { packedOrder } from '@gaussian-splat/renderer';
+import { packedOrder, weighSplats, type SeenSplats } from '@gaussian-splat/renderer';
 import type { Steps } from '../allocate-steps.js';
 import { findPalette } from './palette.js';
 import { writeZip } from './zip.js';
@@ -27,6 +27,8 @@ export interface SogOptions {
   /** Entries of the palette of harmonics, at most 65,536. */
   readonly palette: number;
   readonly encodeWebp: EncodeWebp;
+  /** How the splats of the cloud are seen: what shows little of their harmonics has a less fitting entry of the palette. Default: as opacities and sizes tell. */
+  readonly seen?: SeenSplats | undefined;
   /** See {@link EncodeWebp}; default 0.7: with 1 it takes twenty times as long, for 1 % less. */
   readonly effort?: number;
 }
@@ -60,9 +62,16 @@ export async function sogFiles(
   const { steps } = options;
   const images = new Map<string, Image>();
   const means = putMeans(cloud, order, steps.place, images);
-  const scales = codebook(order, 3, (i, k) => Math.log(cloud.scales[3 * i + k]), LN2 * steps.size);
+  const { length } = order;
+  const scales = codebook(length, 3, (n, k) => Math.log(cloud.scales[3 * order[n] + k]), LN2 * steps.size);
   const stride = 3 * shCoefficientCount(cloud.shDegree);
-  const colors = codebook(order, 3, (i, k) => cloud.sh[stride * i + k], steps.color);
+  const harmonics = cloud.shDegree > 0 ? harmonicsOf(cloud, order, options) : undefined;
+  const colors = codebook(
+    length,
+    3,
+    (n, k) => cloud.sh[stride * order[n] + k] - (harmonics?.added[3 * n + k] ?? 0),
+    steps.color,
+  );
   const opacities = Uint8Array.from(order, (i) => roundedByte(255 * cloud.opacities[i], steps.opacity));
   images.set(
     'scales.webp',
@@ -73,7 +82,7 @@ export async function sogFiles(
     'sh0.webp',
     ofSplats(order.length, (k, c) => (c < 3 ? colors.codes[3 * k + c] : opacities[k])),
   );
-  const harmonics = cloud.shDegree > 0 ? putHarmonics(cloud, order, options, images) : undefined;
+  for (const [name, image] of harmonics?.images ?? []) images.set(name, image);
   const meta = {
     version: 2,
     count: order.length,
@@ -83,7 +92,7 @@ export async function sogFiles(
     scales: { codebook: scales.values, files: ['scales.webp'] },
     quats: { files: ['quats.webp'] },
     sh0: { codebook: colors.values, files: ['sh0.webp'] },
-    ...(harmonics && { shN: { ...harmonics, files: ['shN_centroids.webp', 'shN_labels.webp'] } }),
+    ...(harmonics && { shN: { ...harmonics.meta, files: ['shN_centroids.webp', 'shN_labels.webp'] } }),
   };
   const files = new Map<string, Uint8Array>([['meta.json', new TextEncoder().encode(JSON.stringify(meta))]]);
   for (const [name, { rgba, width, height }] of images) {
@@ -165,15 +174,15 @@ const signedByte = (value: number, step: number): number =>
 
 /** Evenly spaced values, and the nearest of them of each number. */
 function codebook(
-  order: Uint32Array,
+  length: number,
   width: number,
-  of: (i: number, k: number) => number,
+  of: (n: number, k: number) => number,
   step: number,
 ): { values: number[]; codes: Uint8Array } {
   let [low, high] = [Infinity, -Infinity];
-  for (const i of order) {
+  for (let n = 0; n < length; n++) {
     for (let k = 0; k < width; k++) {
-      const value = of(i, k);
+      const value = of(n, k);
       if (!Number.isFinite(value)) continue;
       low = Math.min(low, value);
       high = Math.max(high, value);
@@ -181,35 +190,32 @@ function codebook(
   }
   const spacing = Math.max(step, (high - low) / MOST_CODES) || 1;
   const count = Math.min(MOST_CODES, Math.ceil((high - low) / spacing)) + 1;
-  const codes = new Uint8Array(width * order.length);
-  order.forEach((i, n) => {
+  const codes = new Uint8Array(width * length);
+  for (let n = 0; n < length; n++) {
     for (let k = 0; k < width; k++) {
-      codes[width * n + k] = Math.min(count - 1, Math.max(0, Math.round((of(i, k) - low) / spacing)));
+      codes[width * n + k] = Math.min(count - 1, Math.max(0, Math.round((of(n, k) - low) / spacing)));
     }
-  });
+  }
   const values = Array.from({ length: count }, (_, code) => Number((low + spacing * code).toPrecision(DIGITS)));
   return { values, codes };
 }
 
-function putHarmonics(
-  { sh, shDegree, opacities, scales }: GaussianCloud,
-  order: Uint32Array,
-  { palette: size }: SogOptions,
-  images: Map<string, Image>,
-): { count: number; bands: number; codebook: number[] } {
+/** The palette of harmonics, as images and in `meta.json`, and what it adds to the colours that views see of each splat: its constant coefficient makes up for that. */
+interface Harmonics {
+  readonly meta: { readonly count: number; readonly bands: number; readonly codebook: readonly number[] };
+  readonly images: ReadonlyMap<string, Image>;
+  /** [N, 3] */
+  readonly added: Float32Array;
+}
+
+function harmonicsOf(cloud: GaussianCloud, order: Uint32Array, { palette: size, seen }: SogOptions): Harmonics {
+  const { sh, shDegree } = cloud;
   const width = 3 * (shCoefficientCount(shDegree) - 1);
   const vectors = new Float32Array(width * order.length);
-  const weights = new Float32Array(order.length);
-  order.forEach((i, k) => {
-    vectors.set(sh.subarray((width + 3) * i + 3, (width + 3) * (i + 1)), width * k);
-    const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
-    // What an error shows: opacity squared, times the area.
-    weights[k] = opacities[i] ** 2 * (Math.max(a * b, b * c, a * c) + 1e-20);
-  });
-  const palette = findPalette(vectors, width, weights, size);
+  order.forEach((i, k) => vectors.set(sh.subarray((width + 3) * i + 3, (width + 3) * (i + 1)), width * k));
+  const palette = findPalette(vectors, width, weightsOf(cloud, order, seen), size);
   const { labels } = palette;
-  const entries = Uint32Array.from({ length: palette.size }, (_, k) => k);
-  const { values, codes } = codebook(entries, width, (i, k) => palette.entries[width * i + k], 0);
+  const { values, codes } = codebook(palette.size, width, (n, k) => palette.entries[width * n + k], 0);
   const image = imageOf((PALETTE_ROW * width) / 3, Math.ceil(palette.size / PALETTE_ROW));
   for (let entry = 0; entry < palette.size; entry++) {
     const first = ((Math.floor(entry / PALETTE_ROW) * PALETTE_ROW + (entry % PALETTE_ROW)) * width) / 3;
@@ -218,12 +224,57 @@ function putHarmonics(
       image.rgba.set([...codes.subarray(width * entry + 3 * k, width * entry + 3 * k + 3), 255], at);
     }
   }
-  images.set('shN_centroids.webp', image);
-  images.set(
-    'shN_labels.webp',
-    ofSplats(order.length, (k, c) => [labels[k] & 255, labels[k] >> 8, 0, 255][c]),
-  );
-  return { count: palette.size, bands: shDegree, codebook: values };
+  return {
+    meta: { count: palette.size, bands: shDegree, codebook: values },
+    images: new Map([
+      ['shN_centroids.webp', image],
+      ['shN_labels.webp', ofSplats(order.length, (k, c) => [labels[k] & 255, labels[k] >> 8, 0, 255][c])],
+    ]),
+    added: addedBy((k, n) => values[codes[width * labels[k] + n]] - vectors[width * k + n], order, width, seen),
+  };
+}
+
+/** What an error of each splat shows. */
+function weightsOf(
+  { opacities, scales }: GaussianCloud,
+  order: Uint32Array,
+  seen: SeenSplats | undefined,
+): Float32Array {
+  const usual = Float32Array.from(order, (i) => {
+    const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
+    // Opacity squared, times the area.
+    return opacities[i] ** 2 * (Math.max(a * b, b * c, a * c) + 1e-20);
+  });
+  return seen
+    ? weighSplats(
+        usual,
+        Float32Array.from(order, (i) => seen.energies[i]),
+      ).weights
+    : usual;
+}
+
+/**
+ * Constant coefficients of the colours that views see of some harmonics, in the mean: with M the mean of Y Yᵀ, the sum of M_j0 / M_00 times coefficient j; a root of M has the same quotients in its first column.
+ * @param of coefficient and channel `n` of the splat at place k of the order
+ */
+function addedBy(
+  of: (k: number, n: number) => number,
+  order: Uint32Array,
+  width: number,
+  seen: SeenSplats | undefined,
+): Float32Array {
+  const added = new Float32Array(3 * order.length);
+  if (!seen?.roots.length) return added;
+  const numbers = ((width / 3 + 1) * (width / 3 + 2)) / 2;
+  order.forEach((i, k) => {
+    if (!(seen.energies[i] > 0)) return;
+    const root = seen.roots.subarray(numbers * i, numbers * (i + 1));
+    for (let n = 0; n < width; n++) {
+      const j = 1 + Math.floor(n / 3);
+      added[3 * k + (n % 3)] += (root[(j * (j + 1)) / 2] / root[0]) * of(k, n);
+    }
+  });
+  return added;
 }
 
 export function nothingToWrite(): GaussianSplatError {

@@ -67,7 +67,8 @@ export async function writeStreamedSog(
         level === 0 ? joined(parts.map((box) => box.kept)) : Uint32Array.from({ length: offset }, (_, i) => i);
       const folder = `${level}_${k}`;
       filenames.push(`${folder}/meta.json`);
-      for (const [name, bytes] of await sogFiles(part, kept, options)) files.set(`${folder}/${name}`, bytes);
+      for (const [name, bytes] of await sogFiles(part, kept, level === 0 ? options : { ...options, seen: undefined }))
+        files.set(`${folder}/${name}`, bytes);
     }
   }
   const children = boxes.map(({ kept }, box) => ({ bound: boundOf(cloud, kept), lods: lods[box] }));

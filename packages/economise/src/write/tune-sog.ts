@@ -1,4 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type { SeenSplats } from '@gaussian-splat/renderer';
 import { allocateSteps, scaledSteps } from '../allocate-steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
 import { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './sog.js';
@@ -10,7 +11,7 @@ const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 
 const NUMBERS: SogSteps = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
 /** As fine as files can have them. */
 const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3 };
-const PALETTES = [1024, 4096, 16_384, 65_536];
+const PALETTES = [1024, 4096, 8192, 16_384, 32_768, 65_536];
 /** Share of the error that goes to the palette at most, if a larger one makes less. */
 const PALETTE_SHARE = 0.4;
 const MOST_TRIES = 4;
@@ -31,14 +32,16 @@ export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false):
     write: () => {
       throw withoutWebp();
     },
-    tune: async (whole, measure, target) => {
+    tune: async (whole, measure, target, seen) => {
       if (encodeWebp === undefined) throw withoutWebp();
-      const { title, options } = await tuned(whole, measure, target, encodeWebp);
+      const { title, options } = await tuned(whole, measure, target, encodeWebp, seen);
       return {
         title: `${isStreamed ? 'streamed ' : ''}${title}`,
         hasOneDegree: true,
-        write: async ({ cloud }) =>
-          isStreamed ? writeZip(await writeStreamedSog(cloud, options)) : writeSog(cloud, options),
+        write: async ({ cloud, kept }) => {
+          const own = { ...options, seen: seen && kept ? splatsSeen(seen, kept) : seen };
+          return isStreamed ? writeZip(await writeStreamedSog(cloud, own)) : writeSog(cloud, own);
+        },
       };
     },
   };
@@ -49,9 +52,10 @@ async function tuned(
   measure: Measure,
   target: number,
   encodeWebp: EncodeWebp,
+  seen: SeenSplats | undefined,
 ): Promise<{ title: string; options: SogOptions }> {
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
-    measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK }));
+    measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK, seen }));
   let palette = PALETTES[0];
   let rest = target;
   if (cloud.shDegree > 0) {
@@ -78,6 +82,14 @@ async function tuned(
       .join(', ')}${cloud.shDegree > 0 ? `, palette ${palette}` : ''}`,
     options: { steps, palette, encodeWebp },
   };
+}
+
+/** How some of the splats are seen. */
+function splatsSeen({ energies, roots }: SeenSplats, kept: Uint32Array): SeenSplats {
+  const numbers = roots.length / energies.length;
+  const own = new Float32Array(numbers * kept.length);
+  kept.forEach((i, k) => own.set(roots.subarray(numbers * i, numbers * (i + 1)), numbers * k));
+  return { energies: Float32Array.from(kept, (i) => energies[i]), roots: own };
 }
 
 const withoutWebp = (): GaussianSplatError =>

@@ -176,7 +176,7 @@ export function manifestOf(
   return {
     ...{
       format: 'gaussian-splat-detail',
-      version: coding ? 3 : geometry ? 2 : 1,
+      version: coding ? 4 : geometry ? 2 : 1,
       splats,
       shDegree: levels[0].shDegree,
     },

@@ -14,6 +14,7 @@ import {
   gathered,
   headBytes,
   mostBytes,
+  MIDDLE,
   PLANES,
   planesOf,
   SIZE_CODES,
@@ -215,7 +216,7 @@ class PageDecoder {
     const stride = 4 * shWords(shDegree, 'int8');
     const wide = (k: number): Int16Array => {
       const [low, high] = [this.#plane(PLANES.color + 2 * k), this.#plane(PLANES.color + 2 * k + 1)];
-      return Int16Array.from(low, (byte, i) => byte | (high[i] << 8));
+      return Int16Array.from(low, (byte, i) => (byte | (high[i] << 8)) - MIDDLE);
     };
     const [luma, orange, green] = [wide(0), wide(1), wide(2)];
     const classes = shDegree > 0 ? this.#plane(PLANES.class) : undefined;
@@ -223,6 +224,7 @@ class PageDecoder {
       const plane = this.#plane(PLANES.harmonics + k);
       return new Int8Array(plane.buffer, plane.byteOffset, plane.length);
     });
+    const count = signed.length / 3;
     const places = harmonicPlaces(shDegree, stride);
     for (let c = 0, i = 0, j = 0; c < chunks; c++) {
       let at = stride * CULL_GROUP * c;
@@ -237,12 +239,13 @@ class PageDecoder {
         // A scale of 0 stands for zeros.
         const scale = Math.min(255, coding.scale + CLASS_STEP * (own - 1));
         for (let band = 0; band < shDegree; band++) bytes[at + SCALE_BYTES[band]] = scale;
-        for (let k = 0; k < signed.length; k += 3) {
-          const [fromRed, fromGreen] = [CHROMA_CODES * signed[k + 1][j], CHROMA_CODES * signed[k + 2][j]];
+        for (let k = 0; k < count; k++) {
+          const fromRed = CHROMA_CODES * signed[count + k][j];
+          const fromGreen = CHROMA_CODES * signed[2 * count + k][j];
           const middle = signed[k][j] - fromGreen / 2;
-          bytes[at + places[k]] = limited(middle + fromRed / 2);
-          bytes[at + places[k + 1]] = limited(middle + fromGreen);
-          bytes[at + places[k + 2]] = limited(middle - fromRed / 2);
+          bytes[at + places[3 * k]] = limited(middle + fromRed / 2);
+          bytes[at + places[3 * k + 1]] = limited(middle + fromGreen);
+          bytes[at + places[3 * k + 2]] = limited(middle - fromRed / 2);
         }
         j++;
       }

@@ -4,7 +4,6 @@ import { SCALE_BIAS, SCALE_STEPS } from '../pack/sh.js';
 import type { BuiltPage, DetailTree } from './build-pages.js';
 import { ENDLESS, type ChunkErrors } from './chunk-detail.js';
 import {
-  CHROMA_CODES,
   CHUNK_FLOATS,
   CLASS_STEP,
   CLASSES,
@@ -13,27 +12,31 @@ import {
   headBytes,
   interleaved,
   LEAST_OPACITY_STEP,
+  MIDDLE,
   PLAIN,
   PLANES,
   planesOf,
   type PageCoding,
 } from './page-coding.js';
+import { differencesOf, HarmonicRounder } from './round-harmonics.js';
+import { weighSplats, type SeenSplats } from './seen-splats.js';
 import { directionIn2, directionIn3, rowLengths } from './quantized-geometry.js';
 import { FACTOR_NUMBERS, shNumbers, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP, ALPHA_MIN, QUANTIZED_OPAQUE, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO } = constants;
 const MOST_PLACES = 65_535;
 const MOST_SIZES = 255;
+const MOST_COLOR = 32_000;
 /** The splat of a chunk whose size coordinates are rounded by: so many of the chunk are smaller. */
 const SIZE_RANK = 0.35;
 /** The splat that the first class is of: so many weigh less. */
 const REFERENCE_RANK = 0.9;
-/** Coefficients above the constant one are taken for 0 below this share of a step: zeros cost hardly a bit. */
-const DEAD_ZONE = 0.62;
-/** Levels above the finest are so far from the scene that steps four times as large show nothing: octaves. */
-const COARSE_OCTAVES = 2;
-/** Of a luma and of each difference: their sum is a byte. */
-const MOST_HARMONIC = 42;
+/** How much larger steps are above the finest level, in octaves: such levels are so far off that what they round is far less than what they leave out. */
+const COARSE: Octaves = { place: 4, size: 3, direction: 4, opacity: 3, color: 2, harmonics: 4 };
+const FINEST: Octaves = { place: 0, size: 0, direction: 0, opacity: 0, color: 0, harmonics: 0 };
+
+type Octaves = Readonly<Record<'place' | 'size' | 'direction' | 'opacity' | 'color' | 'harmonics', number>>;
+
 /** Steps of what is rounded, in no unit that they share. */
 export interface PageSteps {
   /** Of coordinates, in the least size of a splat of their chunk that many are smaller than. */
@@ -85,6 +88,7 @@ class Planes {
   readonly bytes: Uint8Array[];
   count = 0;
   #classed = 0;
+  #lower: readonly [count: number, classed: number] = [0, 0];
 
   constructor(splats: number, degree: SplatLevel['shDegree']) {
     this.bytes = Array.from({ length: planesOf(degree) }, () => new Uint8Array(splats));
@@ -100,10 +104,26 @@ class Planes {
     this.#classed++;
   }
 
-  /** Those that have harmonics are fewer. */
-  get whole(): Uint8Array[] {
-    return this.bytes.map((plane, k) => (k < PLANES.harmonics ? plane : plane.subarray(0, this.#classed)));
+  /** Says that what comes now is of a finer level. */
+  beginLower(): void {
+    this.#lower = [this.count, this.#classed];
   }
+
+  /** Planes, and where in each those of the finer level begin. Splats that have harmonics are fewer. */
+  get whole(): { plane: Uint8Array; lower: number }[] {
+    const [all, classed] = this.#lower;
+    return this.bytes.map((plane, k) =>
+      k < PLANES.harmonics ? { plane, lower: all } : { plane: plane.subarray(0, this.#classed), lower: classed },
+    );
+  }
+}
+
+/** What {@link PageEncoder} is told of a scene. */
+export interface PageEncoderOptions {
+  /** Compresses a piece of a file. */
+  readonly deflate: Deflate;
+  /** How the splats of the tree's cloud are seen: what shows little is rounded more. Default: as opacities and sizes tell. */
+  readonly seen?: SeenSplats | undefined;
 }
 
 /** Writes coded files of pages: see docs/detail-pages.md. */
@@ -112,21 +132,19 @@ export class PageEncoder {
   readonly #coding: WrittenCoding;
   readonly #deflate: Deflate;
   readonly #keepsOrder: boolean;
-  /** See {@link classOf}. */
-  readonly #reference: number;
-  readonly #finest: SplatLevel;
+  readonly #rounder: HarmonicRounder;
+  readonly #weights: SplatWeights;
 
   /** @param coding of all files of the folder */
-  constructor(tree: DetailTree, coding: WrittenCoding, deflate: Deflate) {
+  constructor(tree: DetailTree, coding: WrittenCoding, { deflate, seen }: PageEncoderOptions) {
+    const [leaves] = tree.levels;
     this.#tree = tree;
     this.#coding = coding;
     this.#deflate = deflate;
     // Splats of planes stay in the file's order: see mortonOrder.
-    this.#keepsOrder = isOfPlanes(tree.levels[0].positions);
-    const [leaves] = tree.levels;
-    const weights = Float64Array.from({ length: leaves.count }, (_, i) => weightOf(leaves, i)).sort();
-    this.#reference = weights[Math.floor(REFERENCE_RANK * (weights.length - 1))];
-    this.#finest = leaves;
+    this.#keepsOrder = isOfPlanes(leaves.positions);
+    this.#rounder = new HarmonicRounder(shNumbers(leaves.shDegree) / 3, seen);
+    this.#weights = new SplatWeights(leaves, seen?.energies);
   }
 
   /** The file of a page. */
@@ -145,9 +163,9 @@ export class PageEncoder {
     const least = Math.fround((largest > 0 ? Math.log2(largest) : 0) - MOST_SIZES * this.#coding.size);
     const floats = new Float32Array(CHUNK_FLOATS * chunks + FILE_FLOATS);
     holds.forEach(([level, chunk], k) => {
+      if (k > 0 && level !== holds[k - 1][0]) planes.beginLower();
       const splats = this.#ordered(levels[level], CULL_GROUP * chunk, counts[k]);
-      const reference = this.#reference + this.#octavesOf(levels[level]);
-      const reach = putSplats(levels[level], splats, least, this.#coding, reference, planes);
+      const reach = this.#putSplats(levels[level], splats, least, planes);
       floats.set([...splats.origin, splats.step, reach, ...rowOf(errors[level], chunk)], CHUNK_FLOATS * k);
     });
     const [level, chunk] = holds[0];
@@ -156,9 +174,56 @@ export class PageEncoder {
     return joined(headOf(counts, floats, { chunks, shDegree }), planes, this.#deflate);
   }
 
-  /** How much coarser than those of the finest level steps are. */
-  #octavesOf(level: SplatLevel): number {
-    return level === this.#finest ? 0 : COARSE_OCTAVES;
+  #octavesOf(level: SplatLevel): Octaves {
+    return level === this.#tree.levels[0] ? FINEST : COARSE;
+  }
+
+  /** Puts splats into planes. @returns how far they reach, as boundLevel finds it */
+  #putSplats(level: SplatLevel, { splats }: Ordered, least: number, planes: Planes): number {
+    const octaves = this.#octavesOf(level);
+    let [fine, coarse, reach] = [0, 0, 0];
+    for (const splat of splats) {
+      let [low, high] = [splat.fine - fine, splat.coarse - coarse];
+      if (low < 0) [low, high] = [low + 2 ** 24, high - 1];
+      [fine, coarse] = [splat.fine, splat.coarse];
+      for (let byte = 0; byte < 3; byte++) {
+        planes.put(PLANES.place + byte, low >> (8 * byte));
+        planes.put(PLANES.place + 3 + byte, high >> (8 * byte));
+      }
+      reach = Math.max(reach, putShape(level, splat.i, { least, octaves, coding: this.#coding }, planes));
+      this.#putColors(level, splat.i, octaves, planes);
+      planes.count++;
+    }
+    return reach;
+  }
+
+  #putColors(level: SplatLevel, i: number, octaves: Octaves, planes: Planes): void {
+    const { sh, shDegree } = level;
+    const first = shNumbers(shDegree) * numberOf(level, i);
+    const shift = shDegree > 0 ? this.#putHarmonics(level, i, octaves, planes) : [0, 0, 0];
+    const { color, chroma } = this.#coding;
+    differencesOf(sh, first).forEach((value, n) => {
+      const steps = roundedTo((value - shift[n]) / (n === 0 ? color : chroma), octaves.color);
+      const code = MIDDLE + Math.max(-MOST_COLOR, Math.min(MOST_COLOR, steps));
+      planes.put(PLANES.color + 2 * n, code);
+      planes.put(PLANES.color + 2 * n + 1, code >> 8);
+    });
+  }
+
+  /** @returns what the constant coefficient makes up for */
+  #putHarmonics(level: SplatLevel, i: number, octaves: Octaves, planes: Planes): readonly number[] {
+    const rounder = this.#rounder;
+    const number = numberOf(level, i);
+    const first = shNumbers(level.shDegree) * number;
+    const seenAs = level === this.#tree.levels[0] ? number : undefined;
+    let own = Math.round(1 + this.#weights.below(level, i) + octaves.harmonics);
+    own = Math.min(CLASSES, Math.max(1, own));
+    // One that does not fit into bytes needs larger steps.
+    while (!rounder.round(level.sh, first, seenAs, stepOf(this.#coding, own)) && own < CLASSES) own++;
+    const isNone = rounder.codes.every((code) => code === 0);
+    planes.put(PLANES.class, isNone ? 0 : own);
+    if (!isNone) planes.putHarmonics(rounder.codes);
+    return rounder.constantShift();
   }
 
   /** Splats of a chunk along a curve through it, on which coordinates differ little from one to the next. */
@@ -166,7 +231,7 @@ export class PageEncoder {
     const own = level.positions.subarray(3 * first, 3 * (first + count));
     const origin = [0, 1, 2].map((axis) => extremeOf(own, axis, Math.min));
     const extent = Math.max(...origin.map((low, axis) => extremeOf(own, axis, Math.max) - low));
-    const size = this.#coding.place * typicalSize(level, first, count) * 2 ** this.#octavesOf(level);
+    const size = this.#coding.place * typicalSize(level, first, count) * 2 ** this.#octavesOf(level).place;
     const step = Math.fround(Math.max(size, (1.0001 * extent) / MOST_PLACES));
     const splats = Array.from({ length: count }, (_, k) => {
       const [x, y, z] = origin.map((low, axis) => (step > 0 ? Math.round((own[3 * k + axis] - low) / step) : 0));
@@ -206,44 +271,39 @@ function largestOf({ factors }: SplatLevel, first: number, count: number): numbe
   return largest;
 }
 
-/** Log2 of how much an error of a splat's colour adds to that of pictures: its opacity, and the root of the area that it covers. */
+/** How much an error of a splat's colour adds to the squared error of pictures: the square of its opacity, times the area that it covers. */
 function weightOf({ factors, opacities }: SplatLevel, i: number): number {
   const lengths = new Float64Array(3);
   rowLengths(factors, FACTOR_NUMBERS * i, lengths);
   lengths.sort();
-  return Math.max(-60, Math.log2(opacities[i]) + Math.log2(lengths[1] * lengths[2]) / 2);
+  return opacities[i] ** 2 * lengths[1] * lengths[2];
 }
 
-/** Splats that weigh less have larger steps: as much larger as lets a bit save the same everywhere. */
-function classOf(level: SplatLevel, i: number, reference: number): number {
-  if (level.shDegree === 0) return 0;
-  return 1 + Math.min(CLASSES - 1, Math.max(0, Math.round(reference - weightOf(level, i))));
-}
+/** How many octaves splats weigh less than those that show much. */
+class SplatWeights {
+  readonly #leaves: SplatLevel;
+  /** Of the leaves. */
+  readonly #weights: Float32Array;
+  readonly #unit: number;
+  /** The weight that the first class is of. */
+  readonly #reference: number;
 
-/** Puts splats into planes. @returns how far they reach, as boundLevel finds it */
-function putSplats(
-  level: SplatLevel,
-  { splats }: Ordered,
-  least: number,
-  coding: PageCoding,
-  reference: number,
-  planes: Planes,
-): number {
-  let [fine, coarse, reach] = [0, 0, 0];
-  for (const splat of splats) {
-    let [low, high] = [splat.fine - fine, splat.coarse - coarse];
-    if (low < 0) [low, high] = [low + 2 ** 24, high - 1];
-    [fine, coarse] = [splat.fine, splat.coarse];
-    for (let byte = 0; byte < 3; byte++) {
-      planes.put(PLANES.place + byte, low >> (8 * byte));
-      planes.put(PLANES.place + 3 + byte, high >> (8 * byte));
-    }
-    reach = Math.max(reach, putShape(level, splat.i, least, coding, planes));
-    putColors(level, splat.i, coding, classOf(level, splat.i, reference), planes);
-    planes.count++;
+  constructor(leaves: SplatLevel, energies: Float32Array | undefined) {
+    this.#leaves = leaves;
+    const usual = Float32Array.from({ length: leaves.count }, (_, i) => weightOf(leaves, i));
+    const own = energies && usual.map((_, i) => energies[numberOf(leaves, i)]);
+    ({ weights: this.#weights, unit: this.#unit } = own ? weighSplats(usual, own) : { weights: usual, unit: 1 });
+    this.#reference = this.#weights.slice().sort()[Math.floor(REFERENCE_RANK * (leaves.count - 1))];
   }
-  return reach;
+
+  below(level: SplatLevel, i: number): number {
+    const weight = level === this.#leaves ? this.#weights[i] : this.#unit * weightOf(level, i);
+    return Math.log2(this.#reference / Math.max(1e-36, weight)) / 2;
+  }
 }
+
+/** The number of a level's splat in the arrays that its harmonics are in. */
+const numberOf = ({ shOrder }: SplatLevel, i: number): number => (shOrder ? shOrder[i] : i);
 
 /** Of the least extents of splats, the one that {@link SIZE_RANK} of them are below. */
 function typicalSize({ factors }: SplatLevel, first: number, count: number): number {
@@ -259,8 +319,7 @@ function typicalSize({ factors }: SplatLevel, first: number, count: number): num
 function putShape(
   { factors, opacities }: SplatLevel,
   i: number,
-  least: number,
-  coding: PageCoding,
+  { least, octaves, coding }: { least: number; octaves: Octaves; coding: PageCoding },
   planes: Planes,
 ): number {
   const f = FACTOR_NUMBERS * i;
@@ -268,7 +327,7 @@ function putShape(
   rowLengths(factors, f, lengths);
   let trace = 0;
   lengths.forEach((length, k) => {
-    const code = Math.min(MOST_SIZES, Math.max(0, Math.round((Math.log2(length) - least) / coding.size)));
+    const code = Math.min(MOST_SIZES, Math.max(0, roundedTo((Math.log2(length) - least) / coding.size, octaves.size)));
     planes.put(PLANES.size + k, code);
     trace += 2 ** (2 * (least + coding.size * code));
   });
@@ -277,63 +336,23 @@ function putShape(
   const t = directionIn2(first * factors[f + 1], factors[f + 2]);
   const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
   const last = coding.directions - 1;
-  planes.put(PLANES.direction, Math.round((t * last) / (2 * QUANTIZED_T_ZERO)));
-  planes.put(PLANES.direction + 1, Math.round((u * last) / (2 * QUANTIZED_UV_ZERO)));
-  planes.put(PLANES.direction + 2, Math.round((v * last) / (2 * QUANTIZED_UV_ZERO)));
-  const opacity = Math.min(255, Math.round((opacities[i] * QUANTIZED_OPAQUE) / coding.opacity));
+  const zeros = [QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO, QUANTIZED_UV_ZERO];
+  // From the middle, which is no turn at all.
+  [t, u, v].forEach((number, k) => {
+    const code = last / 2 + roundedTo((number / zeros[k] - 1) * (last / 2), octaves.direction);
+    planes.put(PLANES.direction + k, Math.min(last, Math.max(0, code)));
+  });
+  const opacity = Math.min(255, roundedTo((opacities[i] * QUANTIZED_OPAQUE) / coding.opacity, octaves.opacity));
   planes.put(PLANES.opacity, opacity);
   const shown = (opacity * coding.opacity) / QUANTIZED_OPAQUE;
   return 1.001 * Math.sqrt(trace * 2 * Math.log(Math.max(1, shown / ALPHA_MIN)));
 }
 
-function putColors(
-  { sh, shOrder, shDegree }: SplatLevel,
-  i: number,
-  coding: PageCoding,
-  finest: number,
-  planes: Planes,
-): void {
-  const stride = shNumbers(shDegree);
-  const first = stride * (shOrder ? shOrder[i] : i);
-  const [luma, orange, green] = differencesOf(sh, first);
-  [luma / coding.color, orange / coding.chroma, green / coding.chroma].forEach((value, n) => {
-    const code = Math.max(-32768, Math.min(32767, Math.round(value)));
-    planes.put(PLANES.color + 2 * n, code);
-    planes.put(PLANES.color + 2 * n + 1, code >> 8);
-  });
-  if (shDegree === 0) return;
-  const codes = new Int8Array(stride - 3);
-  let own = finest;
-  // One that does not fit into a byte needs larger steps.
-  while (!fillHarmonics(sh, first + 3, stepOf(coding, own), codes) && own < CLASSES) own++;
-  const isNone = codes.every((code) => code === 0);
-  planes.put(PLANES.class, isNone ? 0 : own);
-  if (!isNone) planes.putHarmonics(codes);
-}
-
 const stepOf = ({ scale }: PageCoding, own: number): number =>
   2 ** ((scale + CLASS_STEP * (own - 1)) / SCALE_STEPS - SCALE_BIAS) / 127;
 
-/** A colour's luma and its differences of colours, red less blue and green less their mean: of most colours these are small. */
-function differencesOf(sh: Float32Array, at: number): [luma: number, orange: number, green: number] {
-  const middle = (sh[at] + sh[at + 2]) / 2;
-  return [(middle + sh[at + 1]) / 2, sh[at] - sh[at + 2], sh[at + 1] - middle];
-}
-
-/** @returns false if some had to be cut */
-function fillHarmonics(sh: Float32Array, at: number, step: number, codes: Int8Array): boolean {
-  let isWhole = true;
-  for (let k = 0; k < codes.length; k += 3) {
-    differencesOf(sh, at + k).forEach((value, n) => {
-      const size = Math.abs(value) / (n === 0 ? step : CHROMA_CODES * step);
-      const code = size < DEAD_ZONE ? 0 : Math.round(size);
-      // Half of this range is what the sum of a luma and differences has room for.
-      if (code > MOST_HARMONIC) isWhole = false;
-      codes[k + n] = Math.sign(value) * Math.min(MOST_HARMONIC, code);
-    });
-  }
-  return isWhole;
-}
+/** The nearest multiple of so many steps. */
+const roundedTo = (steps: number, octaves: number): number => 2 ** octaves * Math.round(steps / 2 ** octaves);
 
 /** The bytes before the planes; how these are told is not known yet. */
 function headOf(counts: readonly number[], floats: Float32Array, file: Parameters<typeof headBytes>[0]): Uint8Array {
@@ -349,20 +368,63 @@ function headOf(counts: readonly number[], floats: Float32Array, file: Parameter
 /** An empty last block of a deflate stream. */
 const END = Uint8Array.of(3, 0);
 
-function joined(head: Uint8Array, { whole: bytes }: Planes, deflate: Deflate): Uint8Array<ArrayBuffer> {
-  const pieces = bytes.map((plane, k) => {
+function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Deflate): Uint8Array<ArrayBuffer> {
+  const runs = new Runs(deflate);
+  planes.forEach(({ plane, lower }, k) => {
     const differences = plane.map((byte, i) => byte - (i > 0 ? plane[i - 1] : 0));
-    const [plain, changed] = [plane, differences].map(deflate);
-    const mode = changed.length < plain.length ? DIFFERENCES : PLAIN;
-    head[head.length - bytes.length + k] = mode;
-    return mode === PLAIN ? plain : changed;
+    const [plain, changed] = [plane, differences].map((bytes) => partsOf(bytes, lower, deflate));
+    const mode = lengthOf(changed) < lengthOf(plain) ? DIFFERENCES : PLAIN;
+    head[head.length - planes.length + k] = mode;
+    (mode === PLAIN ? plain : changed).forEach((part) => runs.add(part));
   });
-  const all = [deflate(head), ...pieces, END];
-  const file = new Uint8Array(all.reduce((sum, { length }) => sum + length, 0));
+  return concatenated([deflate(head), ...runs.pieces, END]);
+}
+
+/** Bytes, and what they are compressed to. */
+interface Piece {
+  readonly bytes: Uint8Array;
+  readonly deflated: Uint8Array;
+}
+
+const pieceOf = (bytes: Uint8Array, deflate: Deflate): Piece => ({ bytes, deflated: deflate(bytes) });
+
+const lengthOf = (pieces: readonly Piece[]): number => pieces.reduce((sum, { deflated }) => sum + deflated.length, 0);
+
+/** A plane in one piece, or in two where each is better off with codes of its own. */
+function partsOf(bytes: Uint8Array, at: number, deflate: Deflate): Piece[] {
+  const whole = [pieceOf(bytes, deflate)];
+  if (at === 0 || at === bytes.length) return whole;
+  const parts = [bytes.subarray(0, at), bytes.subarray(at)].map((part) => pieceOf(part, deflate));
+  return lengthOf(parts) < lengthOf(whole) ? parts : whole;
+}
+
+/** Pieces one behind the other: those that are alike share their codes. */
+class Runs {
+  readonly #deflate: Deflate;
+  readonly #runs: Piece[] = [];
+
+  constructor(deflate: Deflate) {
+    this.#deflate = deflate;
+  }
+
+  add(piece: Piece): void {
+    const last = this.#runs.at(-1);
+    const both = last && pieceOf(concatenated([last.bytes, piece.bytes]), this.#deflate);
+    if (both && both.deflated.length < lengthOf([last, piece])) this.#runs[this.#runs.length - 1] = both;
+    else this.#runs.push(piece);
+  }
+
+  get pieces(): Uint8Array[] {
+    return this.#runs.map(({ deflated }) => deflated);
+  }
+}
+
+function concatenated(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
+  const all = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
   let at = 0;
-  for (const piece of all) {
-    file.set(piece, at);
+  for (const piece of pieces) {
+    all.set(piece, at);
     at += piece.length;
   }
-  return file;
+  return all;
 }

@@ -45,8 +45,8 @@ export interface TreeInstance {
  */
 export interface DetailManifest {
   readonly format: 'gaussian-splat-detail';
-  /** 2 if {@link geometry} is given, 3 if {@link coding} is, too. */
-  readonly version: 1 | 2 | 3;
+  /** 2 if {@link geometry} is given, 4 if {@link coding} is, too. 3 was never released. */
+  readonly version: 1 | 2 | 4;
   /** Splats of the finest level. */
   readonly splats: number;
   readonly shDegree: ShDegree;
@@ -109,7 +109,7 @@ export function checkManifest(value: unknown, where: string, mostPages = MOST_PA
   const { format, version, splats, shDegree, shPrecision, geometry, antialiased, origin, bounds } = manifest;
   const { trees, instances } = manifest;
   if (format !== 'gaussian-splat-detail') fail('format', 'gaussian-splat-detail', format, 'decode/unsupported');
-  if (version !== 1 && version !== 2 && version !== 3) fail('version', '1, 2 or 3', version, 'decode/unsupported');
+  if (![1, 2, 4].includes(version as number)) fail('version', '1, 2 or 4', version, 'decode/unsupported');
   if (!isCount(splats)) fail('splats', 'a number of splats', splats);
   if (![0, 1, 2, 3].includes(shDegree as number)) fail('shDegree', '0, 1, 2 or 3', shDegree);
   if (shPrecision !== 'int8' && shPrecision !== 'float16') fail('shPrecision', 'int8 or float16', shPrecision);
@@ -154,7 +154,7 @@ const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [least: number, 
 };
 
 function checkCoding({ version, coding, shPrecision }: Partial<DetailManifest>, fail: Fail): void {
-  if (version !== 3) return void (coding === undefined || fail('coding', 'nothing before version 3', coding));
+  if (version !== 4) return void (coding === undefined || fail('coding', 'nothing before version 4', coding));
   if (shPrecision !== 'int8') fail('shPrecision', 'int8 where files are coded', shPrecision);
   for (const [key, [least, most]] of Object.entries(CODING_RANGES)) {
     const value = coding?.[key as keyof PageCoding];

@@ -45,6 +45,9 @@ export const PLANES = { place: 0, size: 6, direction: 9, opacity: 12, color: 13,
 export const planesOf = (degree: ShDegree): number =>
   degree > 0 ? PLANES.harmonics + shNumbers(degree) - 3 : PLANES.class;
 
+/** What is added to the 16 bits of a constant coefficient: the upper byte of nearly all is 0 then. */
+export const MIDDLE = 128;
+
 /** Classes of splats by how precise their harmonics are; 0 is of those that have none. */
 export const CLASSES = 7;
 /** Between the scales of two classes. */

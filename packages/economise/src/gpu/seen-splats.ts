@@ -1,0 +1,61 @@
+import { shCoefficientCount } from '@gaussian-splat/core';
+import type { SeenSplats } from '@gaussian-splat/renderer';
+import { layouts } from './layouts.js';
+import { readBackWith } from './read-back.js';
+import type { SceneParts } from './scene-parts.js';
+
+/** Share of what is seen of a splat that is imagined besides, from everywhere: no coefficient is free altogether. */
+const IMAGINED = 0.1;
+/** Numbers of roots at most: a gigabyte. Of larger scenes the energies alone are told. */
+const MOST_ROOTS = 2 ** 28;
+
+/**
+ * How views saw the splats of a scene that has been scored in them. Part by part, since the moments of a large scene take gigabytes.
+ * @param views that scored it
+ */
+export async function seenIn(device: GPUDevice, scene: SceneParts, views: number): Promise<SeenSplats> {
+  const { count, shDegree } = scene.gaussians;
+  const size = shCoefficientCount(shDegree);
+  const numbers = shDegree > 0 ? (size * (size + 1)) / 2 : 0;
+  const energies = new Float32Array(count);
+  const hasRoots = numbers > 0 && numbers * count <= MOST_ROOTS;
+  const roots = new Float32Array(hasRoots ? numbers * count : 0);
+  const stride = layouts.Score.size / 4;
+  const at = layouts.Score.fields.energy.offset / 4;
+  for (const { page, first, row, scores, moments } of scene.parts) {
+    const sums = new Float32Array(page.count);
+    await readBackWith(device, [{ buffer: scores, byteLength: layouts.Score.size * page.count }], (mapped) => {
+      const own = new Float32Array(mapped);
+      for (let k = 0; k < page.count; k++) sums[k] = own[stride * k + at];
+    });
+    for (let k = 0; k < page.count; k++) energies[first + k] = sums[k] / views;
+    if (!hasRoots) continue;
+    await readBackWith(device, [{ buffer: moments, byteLength: 4 * numbers * row }], (mapped) => {
+      putRoots(roots.subarray(numbers * first), new Float32Array(mapped), { row, size, sums });
+    });
+  }
+  return { energies, roots };
+}
+
+/** Lower triangular roots (Cholesky) of the moments of each splat, by its energy. */
+function putRoots(
+  roots: Float32Array,
+  moments: Float32Array,
+  { row, size, sums }: { row: number; size: number; sums: Float32Array },
+): void {
+  const numbers = (size * (size + 1)) / 2;
+  const root = new Float64Array(numbers);
+  sums.forEach((sum, i) => {
+    if (!(sum > 0)) return;
+    for (let r = 0, k = 0; r < size; r++) {
+      const ofRow = (r * (r + 1)) / 2;
+      for (let c = 0; c <= r; c++, k++) {
+        const ofColumn = (c * (c + 1)) / 2;
+        let rest = moments[row * k + i] / sum + (r === c ? IMAGINED / (4 * Math.PI) : 0);
+        for (let j = 0; j < c; j++) rest -= root[ofRow + j] * root[ofColumn + j];
+        root[k] = r === c ? Math.sqrt(Math.max(rest, 1e-12)) : rest / root[ofColumn + c];
+      }
+    }
+    roots.set(root, numbers * i);
+  });
+}
