@@ -44,20 +44,20 @@ async function open(device) {
   const url = new URL(query.get('scene'), location.href);
   const fetchFile = startFetching(FETCH_SECONDS);
   const fetched = await progress.wait('the manifest', fetchFile(url, new AbortController().signal));
-  const manifest = checkManifest(JSON.parse(new TextDecoder().decode(fetched)), url.href);
+  const manifest = checkManifest(JSON.parse(new TextDecoder().decode(fetched.bytes)), url.href);
   const traffic = { requests: 0, bytes: 0, errors: [] };
   report.fetched = traffic;
-  const fetchPage = async (file, signal) => {
-    const bytes = await fetchFile(new URL(file, url), signal);
+  const fetchPage = async (file, signal, coded) => {
+    const { bytes, length } = await fetchFile(new URL(file, url), signal, coded);
     traffic.requests++;
-    traffic.bytes += bytes.byteLength;
+    traffic.bytes += length;
     return bytes;
   };
   const onError = (error) => {
     traffic.errors.push(String(error));
     traffic.errors.splice(5);
   };
-  const options = { fetchPage, memoryBudget: 1e6 * megabytes, onError };
+  const options = { fetchPage, isDecoded: true, memoryBudget: 1e6 * megabytes, onError };
   const scene = await progress.wait(
     'the pool and the coarsest page',
     StreamedGaussians.open(device, manifest, options),
