@@ -40,6 +40,8 @@ export interface EconomiseOptions {
   /** Encodes lossless WebP, of which SOG is made: for `.sog` alone. */
   readonly encodeWebp?: EncodeWebp;
   readonly signal?: AbortSignal;
+  /** Searches at most, of formats whose steps are chosen: one that leaves more than was asked is followed by one that aims lower; default 3. */
+  readonly searches?: number;
   /** Called with what is being done. */
   readonly onStep?: (step: string) => void;
 }
@@ -68,6 +70,9 @@ const ROUNDING_SHARE = 0.6;
 /** How much less is taken where the written file misses the figure; the next time as much less again than that. The last try keeps everything. */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
+const USUAL_SEARCHES = 3;
+/** How much more than what was asked is worth another search, dB, and which part of that it aims lower. */
+const [SURPLUS, AIM_SHARE] = [0.1, 0.8];
 const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
@@ -79,13 +84,37 @@ const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: fals
  * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, the file's name is of no known format, or views show nothing of the scene.
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
-  const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
-  const encodings = encodingsFor(options.name, cloud, options);
   const watch = new Stopwatch();
+  const { minDecibels, searches = USUAL_SEARCHES } = options;
+  let best = await economiseTo(meanSquareOf(minDecibels), cloud, options, watch);
+  if (!encodingsFor(options.name, cloud, options).some(({ tune }) => tune)) return best;
+  // What steps, palettes and cuts make together comes in jumps: a search that aims lower may find a smaller file that is still near enough.
+  let aim = minDecibels;
+  for (let tries = 1; tries < searches && best.decibels > minDecibels + SURPLUS; tries++) {
+    aim -= AIM_SHARE * (best.decibels - minDecibels);
+    options.onStep?.(`another search, for ${aim.toFixed(2)} dB`);
+    const other = await economiseTo(meanSquareOf(aim), cloud, options, watch).catch((error: unknown) => {
+      if (error instanceof GaussianSplatError && error.code === 'argument/value') return undefined;
+      throw error;
+    });
+    if (other === undefined || other.decibels < minDecibels || other.bytes.length >= best.bytes.length) break;
+    best = other;
+  }
+  return { ...best, seconds: watch.seconds };
+}
+
+/** @param target mean squared error that is searched for */
+async function economiseTo(
+  target: number,
+  cloud: GaussianCloud,
+  options: EconomiseOptions,
+  watch: Stopwatch,
+): Promise<Economised> {
+  const { evaluator, pool = inline, signal, onStep = () => undefined } = options;
+  const encodings = encodingsFor(options.name, cloud, options);
   onStep(`scoring ${cloud.count} splats`);
   const ranking = await evaluator.rank(signal);
   watch.lap('score');
-  const target = meanSquareOf(minDecibels);
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
   const budget = target - rounding;

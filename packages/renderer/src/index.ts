@@ -36,6 +36,7 @@ export {
 } from './detail/encode-page.js';
 export { cloudOfChunks, type PageChunks } from './detail/page-cloud.js';
 export type { CodedFile, PageCoding } from './detail/page-coding.js';
+export { roundedBy, SeenRounder } from './detail/round-harmonics.js';
 export { weighSplats, type SeenSplats } from './detail/seen-splats.js';
 export { treeOfCopies } from './detail/tile-tree.js';
 export { StreamedGaussians, type PoolOptions, type StreamOptions } from './detail/streamed-gaussians.js';

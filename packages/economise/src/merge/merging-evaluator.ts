@@ -50,7 +50,7 @@ export class MergingEvaluator implements Evaluator {
     const ranking = await this.#inner.rank(signal);
     signal?.throwIfAborted();
     const { views, mostError, pool = inline } = this.#options;
-    this.#merges = await findMerges(this.#cloud, ranking, views, mostError, pool);
+    this.#merges ??= await findMerges(this.#cloud, ranking, views, mostError, pool);
     return ranking;
   }
 

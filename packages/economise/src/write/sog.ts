@@ -1,7 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import { packedOrder, weighSplats, type SeenSplats } from '@gaussian-splat/renderer';
+import { packedOrder, roundedBy, SeenRounder, weighSplats, type SeenSplats } from '@gaussian-splat/renderer';
 import type { Steps } from '../allocate-steps.js';
-import { findPalette } from './palette.js';
+import { findPalette, type Palette } from './palette.js';
 import { writeZip } from './zip.js';
 
 /**
@@ -18,15 +18,17 @@ export type EncodeWebp = (
 
 /**
  * Steps of what is rounded: SOG has bytes for all of it, and images of fewer values are smaller. `place` in 1/65,535 of the scene's logarithmic box, `size` in octaves, `turn` and `opacity` in 1/255,
- * `color` in units of the constant coefficient.
+ * `color` and `harmonics` in units of coefficients, the latter for splats that show much: in others it is larger.
  */
-export type SogSteps = Steps<'place' | 'size' | 'turn' | 'opacity' | 'color'>;
+export type SogSteps = Steps<'place' | 'size' | 'turn' | 'opacity' | 'color' | 'harmonics'>;
 
 export interface SogOptions {
   readonly steps: SogSteps;
   /** Entries of the palette of harmonics, at most 65,536. */
   readonly palette: number;
   readonly encodeWebp: EncodeWebp;
+  /** Palettes that were found for the same cloud and order, by their sizes: those of other steps are the same. */
+  readonly palettes?: Map<number, Palette>;
   /** How the splats of the cloud are seen: what shows little of their harmonics has a less fitting entry of the palette. Default: as opacities and sizes tell. */
   readonly seen?: SeenSplats | undefined;
   /** See {@link EncodeWebp}; default 0.7: with 1 it takes twenty times as long, for 1 % less. */
@@ -39,6 +41,10 @@ const MOST_PLACES = 65_535;
 const PALETTE_ROW = 64;
 /** Codes of a codebook; where steps leave more, larger ones are taken. */
 const MOST_CODES = 255;
+/** The code of 0 in the palette; codes nearer to it than {@link EVEN_CODES} are evenly spaced, and the largest is at most {@link MOST_BENT} steps. */
+const [MIDDLE_CODE, EVEN_CODES, MOST_BENT] = [127, 48, 2000];
+/** The entry that has the usual step, so many weigh less; and how many octaves larger that of others is at most. */
+const [REFERENCE_RANK, MOST_OCTAVES] = [0.9, 5];
 /** Of the values of a codebook: more are more bytes, and finer than any step. */
 const DIGITS = 6;
 const LN2 = Math.LN2;
@@ -208,14 +214,19 @@ interface Harmonics {
   readonly added: Float32Array;
 }
 
-function harmonicsOf(cloud: GaussianCloud, order: Uint32Array, { palette: size, seen }: SogOptions): Harmonics {
+function harmonicsOf(
+  cloud: GaussianCloud,
+  order: Uint32Array,
+  { palette: size, seen, palettes, steps }: SogOptions,
+): Harmonics {
   const { sh, shDegree } = cloud;
   const width = 3 * (shCoefficientCount(shDegree) - 1);
   const vectors = new Float32Array(width * order.length);
   order.forEach((i, k) => vectors.set(sh.subarray((width + 3) * i + 3, (width + 3) * (i + 1)), width * k));
-  const palette = findPalette(vectors, width, weightsOf(cloud, order, seen), size);
-  const { labels } = palette;
-  const { values, codes } = codebook(palette.size, width, (n, k) => palette.entries[width * n + k], 0);
+  const weights = weightsOf(cloud, order, seen);
+  const palette = palettes?.get(size) ?? findPalette(vectors, width, weights, size);
+  palettes?.set(size, palette);
+  const { codes, labels, values } = roundPalette(palette, { order, weights, seen, step: steps.harmonics });
   const image = imageOf((PALETTE_ROW * width) / 3, Math.ceil(palette.size / PALETTE_ROW));
   for (let entry = 0; entry < palette.size; entry++) {
     const first = ((Math.floor(entry / PALETTE_ROW) * PALETTE_ROW + (entry % PALETTE_ROW)) * width) / 3;
@@ -232,6 +243,89 @@ function harmonicsOf(cloud: GaussianCloud, order: Uint32Array, { palette: size, 
     ]),
     added: addedBy((k, n) => values[codes[width * labels[k] + n]] - vectors[width * k + n], order, width, seen),
   };
+}
+
+interface RoundedPalette {
+  /** [size, width], {@link MIDDLE_CODE} for 0 */
+  readonly codes: Uint8Array;
+  /** The entries have another order: those with equal steps are together, and in each such part as they are met first. */
+  readonly labels: Uint32Array;
+  /** The codebook. */
+  readonly values: readonly number[];
+}
+
+/** Rounds entries, each as coarsely as what shows it allows, to what is seen of the splat that shows it most. */
+function roundPalette(
+  { entries, labels, size }: Palette,
+  told: { order: Uint32Array; weights: Float32Array; seen: SeenSplats | undefined; step: number },
+): RoundedPalette {
+  const { order, weights, seen, step } = told;
+  const width = entries.length / size;
+  const sums = new Float32Array(size);
+  const heaviest = new Uint32Array(size);
+  const met: number[] = [];
+  const isMet = new Uint8Array(size);
+  labels.forEach((label, k) => {
+    if (isMet[label] === 0) {
+      met.push(label);
+      [isMet[label], heaviest[label]] = [1, k];
+    } else if (weights[k] > weights[heaviest[label]]) heaviest[label] = k;
+    sums[label] += weights[k];
+  });
+  const reference = sums.slice().sort()[Math.floor(REFERENCE_RANK * (size - 1))];
+  const octaves = Uint8Array.from(sums, (sum) =>
+    Math.min(MOST_OCTAVES, Math.max(0, Math.round(Math.log2(reference / Math.max(1e-36, sum)) / 2))),
+  );
+  // Neighbours in the image with equal steps share codes.
+  const numbers = new Uint32Array(size);
+  met.sort((a, b) => octaves[a] - octaves[b]).forEach((entry, number) => (numbers[entry] = number));
+  const scale = new CodeScale(
+    step,
+    entries.reduce((most, value) => Math.max(most, Math.abs(value)), 0),
+  );
+  const codes = new Uint8Array(entries.length);
+  const rounder = new SeenRounder(width / 3 + 1, seen);
+  for (let entry = 0; entry < size; entry++) {
+    const unit = 2 ** octaves[entry];
+    const [from, to] = [width * entry, width * numbers[entry]];
+    rounder.round(
+      order[heaviest[entry]],
+      (k) => entries.subarray(from + 3 * (k - 1), from + 3 * k) as unknown as readonly number[],
+      (value, weight, k, n) => {
+        const code = Math.sign(value) * scale.codeOf(Math.abs(value), unit, weight);
+        codes[to + 3 * (k - 1) + n] = MIDDLE_CODE + code;
+        return scale.valueOf(code);
+      },
+    );
+  }
+  const values = Array.from({ length: 2 * MIDDLE_CODE + 1 }, (_, k) =>
+    Number(scale.valueOf(k - MIDDLE_CODE).toPrecision(DIGITS)),
+  );
+  return { codes, labels: labels.map((label) => numbers[label]), values };
+}
+
+/** Values of codes -127 to 127: so many steps, and where that does not reach far enough, farther apart the farther from 0. */
+class CodeScale {
+  readonly #step: number;
+  readonly #bend: number;
+
+  constructor(step: number, most: number) {
+    this.#step = Math.max(step, most / MOST_BENT);
+    this.#bend = Math.max(0, most / this.#step - MIDDLE_CODE) / (MIDDLE_CODE - EVEN_CODES) ** 2;
+  }
+
+  valueOf(code: number): number {
+    const size = Math.abs(code);
+    return Math.sign(code) * this.#step * (size + this.#bend * Math.max(0, size - EVEN_CODES) ** 2);
+  }
+
+  /** @param unit codes are multiples of it */
+  codeOf(value: number, unit: number, weight: number): number {
+    const steps = value / this.#step - EVEN_CODES;
+    const bent = this.#bend > 0 && steps > 0 ? (Math.sqrt(1 + 4 * this.#bend * steps) - 1) / (2 * this.#bend) : steps;
+    const code = unit * roundedBy((EVEN_CODES + bent) / unit, weight);
+    return Math.min(code, unit * Math.floor(MIDDLE_CODE / unit));
+  }
 }
 
 /** What an error of each splat shows. */

@@ -1,16 +1,17 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
 import type { SeenSplats } from '@gaussian-splat/renderer';
 import { allocateSteps, scaledSteps } from '../allocate-steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
+import type { Palette } from './palette.js';
 import { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './sog.js';
 import { writeStreamedSog } from './streamed-sog.js';
 import { writeZip } from './zip.js';
 
-const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32 };
-/** Numbers of a splat that each is the step of. */
-const NUMBERS: SogSteps = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
+const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32, harmonics: 1 / 64 };
+/** Numbers of a splat that each is the step of; of an entry of the palette about half is 0. */
+const NUMBERS: Omit<SogSteps, 'harmonics'> = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
 /** As fine as files can have them. */
-const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3 };
+const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3, harmonics: 1e-3 };
 const PALETTES = [1024, 4096, 8192, 16_384, 32_768, 65_536];
 /** Share of the error that goes to the palette at most, if a larger one makes less. */
 const PALETTE_SHARE = 0.4;
@@ -54,8 +55,9 @@ async function tuned(
   encodeWebp: EncodeWebp,
   seen: SeenSplats | undefined,
 ): Promise<{ title: string; options: SogOptions }> {
+  const palettes = new Map<number, Palette>();
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
-    measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK, seen }));
+    measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK, seen, palettes }));
   let palette = PALETTES[0];
   let rest = target;
   if (cloud.shDegree > 0) {
@@ -67,9 +69,10 @@ async function tuned(
   }
   const least = (1 - PALETTE_SHARE) * target * 0.25;
   const share = cloud.shDegree > 0 ? Math.max(least, rest) : target;
-  // Where harmonics are what is rounded most, the others are told apart without them.
   const measured = (steps: SogSteps): Promise<number> => errorOf(steps, palette);
-  let steps = await allocateSteps({ usual: USUAL, numbers: NUMBERS, measure: measured, target: share });
+  const ofPalette = 1.5 * (shCoefficientCount(cloud.shDegree) - 1) * Math.min(1, palette / cloud.count);
+  const numbers = ofPalette > 0 ? { ...NUMBERS, harmonics: ofPalette } : NUMBERS;
+  let steps = await allocateSteps({ usual: USUAL, numbers, measure: measured, target: share });
   for (let tries = 0; tries < MOST_TRIES; tries++) {
     const error = await measured(steps);
     if (error <= target && error >= NEAR_ENOUGH * target) break;
