@@ -11,7 +11,6 @@ import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/economi
 import { readScene } from '@gaussian-splat/formats';
 import { cloudOfChunks, decodePage, deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
-import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
 import { writeSplat } from './splat.mjs';
@@ -23,6 +22,7 @@ const USAGE = `usage: npm run lab:bytes -- [options]
   --out FOLDER     where bytes.json and bytes.svg go (default docs/frontier)
   --scenes A,B     of skull, playbot3, st-peter (default all); others keep their figures
   --views N        held-out views (default 8)
+  --scored N       views that score splats (default 24; 216 is what the commands take by themselves, on a GPU)
   --kept           of what takes long to make only what is in --work
 `;
 
@@ -59,6 +59,7 @@ const { values } = parseArgs({
     out: text(join(root, 'docs/frontier')),
     scenes: text(Object.keys(SCENES).join(',')),
     views: text('8'),
+    scored: text('24'),
     kept: { type: 'boolean' },
     help: { type: 'boolean' },
   },
@@ -122,7 +123,7 @@ async function measure(scene, { source, files }, device) {
   const made = (file) => join(values.work, `${scene}.${file}`);
   const cloud = await read(path(source));
   const around = (count, seed) => viewsAround(boundsOf(cloud), count, { seed });
-  const views = { scored: around(1, 10), searched: around(2, 1), heldOut: around(Number(values.views), 5) };
+  const views = { scored: around(1, 10), searched: around(1, 1), heldOut: around(Number(values.views), 5) };
   const evaluator = await GpuEvaluator.create(device, cloud, views);
   const rows = [];
   const note = async (name, isOwn, bytes, first, decodeMs, found) => {
@@ -165,24 +166,22 @@ async function measure(scene, { source, files }, device) {
     writeFileSync(at, await encoding.write(whole));
     await file(`SPZ 3, ours, ${/\d+ bits/.exec(encoding.title)?.[0]}`, true, at);
   }
-  const measured = async (bytes) => {
-    const errors = await evaluator.compare(await readScene(bytes, { name: 'tuned.sog' }), 'searched');
-    return errors.reduce((sum, error) => sum + error, 0) / errors.length;
-  };
   for (const dB of DECIBELS) {
-    const [{ tune }] = encodingsFor('a.sog', cloud, { encodeWebp });
-    const at = made(`tuned-${dB}.sog`);
-    writeFileSync(at, await (await tune(whole, measured, 10 ** (-dB / 10))).write(whole));
-    await file(`SOG, ours, no splat dropped, ${dB} dB`, true, at);
     const folder = made(`pages-${dB}`);
-    if (make(folder, process.execPath, own('detail', path(source), '--out', folder, '--min-db', String(dB)))) {
+    if (
+      make(
+        folder,
+        process.execPath,
+        own('detail', path(source), '--out', folder, '--min-db', String(dB), '--scored', values.scored),
+      )
+    ) {
       const [ms, found] = await timed(() => readFolder(folder));
       await note(`our pages, ${dB} dB`, true, found.bytes, found.first, ms, found.cloud);
     }
     const smaller = made(`own-${dB}.sog`);
-    const options = ['--min-db', String(dB), '--scored', '24', '--out', smaller];
+    const options = ['--min-db', String(dB), '--scored', values.scored, '--out', smaller];
     if (make(smaller, process.execPath, own('economise', path(source), ...options)))
-      await file(`SOG, ours, pruned, ${dB} dB`, true, smaller);
+      await file(`SOG, ours, ${dB} dB`, true, smaller);
   }
   evaluator.destroy();
   return { name: scene, source, splats: cloud.count, shDegree: cloud.shDegree, rows };
