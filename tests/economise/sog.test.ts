@@ -5,6 +5,7 @@ import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian
 import {
   allocateSteps,
   encodingsFor,
+  fitSteps,
   filesOfZip,
   writeSog,
   writeStreamedSog,
@@ -105,6 +106,21 @@ test('each step makes as much of the error as it has numbers, whatever errors ar
   const steps = await allocateSteps({ usual, numbers, measure: async (s) => errorOf(s), target: 0.02 });
   assert.ok(Math.abs(errorOf(steps) - 0.02) < 0.006, `${errorOf(steps)}`);
   assert.ok(steps.b > steps.c && steps.c > steps.a, JSON.stringify(steps));
+});
+
+test('steps are scaled until they err as much as is allowed, and never more', async () => {
+  for (const power of [1, 2, 3]) {
+    let measured = 0;
+    const measure = async ({ a }: { a: number }): Promise<{ error: number; a: number }> => {
+      measured++;
+      return { error: 1e-3 * a ** power + 2e-4, a };
+    };
+    const found = await fitSteps({ steps: { a: 0.02 * power }, measure, target: 1e-3, tries: 8 });
+    assert.ok(found.error <= 1e-3 && found.error > 0.97e-3, `power ${power}: ${found.error} after ${measured}`);
+    assert.equal(found.steps.a, found.a);
+  }
+  const hopeless = await fitSteps({ steps: { a: 1 }, measure: async ({ a }) => ({ error: 1 + a }), target: 0.5 });
+  assert.ok(hopeless.steps.a < 0.05, 'the finest that were tried');
 });
 
 test('a scene is tuned until its rounding is what it may be, and without an encoder that is said', async () => {

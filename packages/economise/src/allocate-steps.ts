@@ -39,3 +39,61 @@ export async function allocateSteps<K extends string>(options: AllocateOptions<K
 /** The same steps, times a factor. */
 export const scaledSteps = <K extends string>(steps: Steps<K>, factor: number): Steps<K> =>
   Object.fromEntries(Object.entries<number>(steps).map(([name, step]) => [name, step * factor])) as Steps<K>;
+
+/** What steps times a factor came to. */
+interface Tried {
+  readonly scale: number;
+  readonly error: number;
+}
+
+export interface FitStepsOptions<K extends string, Found extends { readonly error: number }> {
+  readonly steps: Steps<K>;
+  /** What is found with some steps, a mean squared error above all. */
+  readonly measure: (steps: Steps<K>) => Promise<Found>;
+  /** Mean squared error that is allowed. */
+  readonly target: number;
+  /** Measurements at most; default 6. */
+  readonly tries?: number;
+  /** Part of the target that is near enough to end with; default 0.97. */
+  readonly nearEnough?: number;
+}
+
+/**
+ * The same steps, times the factor with which they err as much as is allowed, or nearly.
+ * @returns the steps, and what was found with them; the finest that were tried where all err too much
+ */
+export async function fitSteps<K extends string, Found extends { readonly error: number }>(
+  options: FitStepsOptions<K, Found>,
+): Promise<Found & { readonly steps: Steps<K> }> {
+  const { steps, measure, target, tries = 6, nearEnough = 0.97 } = options;
+  const aim = ((1 + nearEnough) / 2) * target;
+  const tried: (Found & { readonly scale: number; readonly steps: Steps<K> })[] = [];
+  for (let scale = 1; tried.length < tries; scale = nextScale(tried, aim)) {
+    const own = scaledSteps(steps, scale);
+    tried.push({ ...(await measure(own)), scale, steps: own });
+    const { error } = tried[tried.length - 1];
+    if (error <= target && error >= nearEnough * target) break;
+  }
+  tried.sort((a, b) => a.error - b.error);
+  return tried.findLast(({ error }) => error <= target) ?? tried[0];
+}
+
+/** A scale is at most so many times as large, or small, as the one before. */
+const FARTHEST_SCALE = 3;
+
+/** Errors go with the square of the scale, until tries above and below the figure tell more. */
+function nextScale(tried: readonly Tried[], aim: number): number {
+  const [below, above] = tried.reduce<readonly [Tried?, Tried?]>(
+    ([low, high], one) =>
+      one.error <= aim
+        ? [low && low.error > one.error ? low : one, high]
+        : [low, high && high.error < one.error ? high : one],
+    [undefined, undefined],
+  );
+  if (below === undefined || above === undefined || above.scale <= below.scale) {
+    const { scale, error } = tried[tried.length - 1];
+    return scale * Math.min(FARTHEST_SCALE, Math.max(1 / FARTHEST_SCALE, Math.sqrt(aim / error)));
+  }
+  const share = Math.log(aim / below.error) / Math.log(above.error / below.error);
+  return below.scale * (above.scale / below.scale) ** Math.min(0.9, Math.max(0.1, share));
+}

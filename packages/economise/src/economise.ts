@@ -40,7 +40,7 @@ export interface EconomiseOptions {
   /** Encodes lossless WebP, of which SOG is made: for `.sog` alone. */
   readonly encodeWebp?: EncodeWebp;
   readonly signal?: AbortSignal;
-  /** Searches at most, of formats whose steps are chosen: one that leaves more than was asked is followed by one that aims lower; default 3. */
+  /** Searches at most, of formats whose steps are chosen: one that leaves more than was asked is followed by one that aims lower; default 4. */
   readonly searches?: number;
   /** Called with what is being done. */
   readonly onStep?: (step: string) => void;
@@ -70,7 +70,7 @@ const ROUNDING_SHARE = 0.6;
 /** How much less is taken where the written file misses the figure; the next time as much less again than that. The last try keeps everything. */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
-const USUAL_SEARCHES = 3;
+const USUAL_SEARCHES = 4;
 /** How much more than what was asked is worth another search, dB, and which part of that it aims lower. */
 const [SURPLUS, AIM_SHARE] = [0.1, 0.8];
 const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
@@ -89,16 +89,16 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   let best = await economiseTo(meanSquareOf(minDecibels), cloud, options, watch);
   if (!encodingsFor(options.name, cloud, options).some(({ tune }) => tune)) return best;
   // What steps, palettes and cuts make together comes in jumps: a search that aims lower may find a smaller file that is still near enough.
-  let aim = minDecibels;
+  let [aim, tooLow] = [minDecibels, -Infinity];
   for (let tries = 1; tries < searches && best.decibels > minDecibels + SURPLUS; tries++) {
-    aim -= AIM_SHARE * (best.decibels - minDecibels);
-    options.onStep?.(`another search, for ${aim.toFixed(2)} dB`);
-    const other = await economiseTo(meanSquareOf(aim), cloud, options, watch).catch((error: unknown) => {
+    const next = Math.max(aim - AIM_SHARE * (best.decibels - minDecibels), (aim + tooLow) / 2);
+    options.onStep?.(`another search, for ${next.toFixed(2)} dB`);
+    const other = await economiseTo(meanSquareOf(next), cloud, options, watch).catch((error: unknown) => {
       if (error instanceof GaussianSplatError && error.code === 'argument/value') return undefined;
       throw error;
     });
-    if (other === undefined || other.decibels < minDecibels || other.bytes.length >= best.bytes.length) break;
-    best = other;
+    const isSmaller = other && other.decibels >= minDecibels && other.bytes.length < best.bytes.length;
+    [aim, tooLow, best] = isSmaller ? [next, tooLow, other] : [aim, next, best];
   }
   return { ...best, seconds: watch.seconds };
 }
@@ -117,7 +117,7 @@ async function economiseTo(
   watch.lap('score');
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
-  const budget = target - rounding;
+  const budget = Math.max(0, target - rounding);
   const { hasOneDegree } = encoding;
   const fitting = { signal, onStep, hasOneDegree };
   const trades = await findTrades(cloud, ranking, evaluator, budget, fitting);

@@ -19,7 +19,14 @@ export {
   type ViewOptions,
 } from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';
-export { allocateSteps, scaledSteps, type AllocateOptions, type Steps } from './allocate-steps.js';
+export {
+  allocateSteps,
+  fitSteps,
+  scaledSteps,
+  type AllocateOptions,
+  type FitStepsOptions,
+  type Steps,
+} from './allocate-steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
 export { filesOfZip } from './write/zip.js';

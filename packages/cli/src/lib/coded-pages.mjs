@@ -1,6 +1,6 @@
 /** How coarse the pages of a streamed scene may be: measured in pictures of them, attribute by attribute. */
 import { boundsOf } from '@gaussian-splat/core';
-import { allocateSteps, GpuEvaluator, scaledSteps, viewsAround, viewsFromEverywhere } from '@gaussian-splat/economise';
+import { allocateSteps, fitSteps, GpuEvaluator, viewsAround, viewsFromEverywhere } from '@gaussian-splat/economise';
 import { cloudOfChunks, codingOf, decodePage, manifestOf, PageEncoder, USUAL_STEPS } from '@gaussian-splat/renderer';
 import { deflateQuickly } from './encoders.mjs';
 
@@ -10,9 +10,6 @@ const numbersOf = (degree) => ({
   ...(degree > 0 && { harmonics: 1.5 * ((degree + 1) ** 2 - 1) }),
 });
 
-/** How near to the figure a search ends, and what it aims at, as parts of the error. */
-const [NEAR_ENOUGH, AIMED] = [0.97, 0.985];
-const MOST_TRIES = 6;
 const decibels = (error) => -10 * Math.log10(error);
 const meanOf = (errors) => errors.reduce((sum, error) => sum + error, 0) / errors.length;
 
@@ -47,18 +44,6 @@ class PageJudge {
   }
 }
 
-/** What all steps are multiplied by next: errors go with their square, until tries above and below the figure tell more. */
-function nextScale(tried, aim) {
-  const above = tried.filter(({ error }) => error > aim).sort((a, b) => a.error - b.error)[0];
-  const below = tried.filter(({ error }) => error <= aim).sort((a, b) => b.error - a.error)[0];
-  if (above === undefined || below === undefined || above.scale <= below.scale) {
-    const { scale, error } = tried.at(-1);
-    return scale * Math.sqrt(aim / error);
-  }
-  const share = Math.log(aim / below.error) / Math.log(above.error / below.error);
-  return below.scale * (above.scale / below.scale) ** Math.min(0.9, Math.max(0.1, share));
-}
-
 /**
  * Steps with which the finest pages of a scene are so near to it in held-out views, and where errors of all attributes cost the same: an attribute whose rounding
  * shows little has larger ones.
@@ -84,18 +69,16 @@ export async function findSteps({ tree, pages, cloud, device, minDecibels, score
   const measure = async (steps) => meanOf(await judge.errors(steps, 'searched'));
   const numbers = numbersOf(shDegree);
   const steps = await allocateSteps({ usual: USUAL_STEPS, numbers, measure, target });
-  const tried = [];
-  for (let scale = 1; tried.length < MOST_TRIES;) {
-    const found = scaledSteps(steps, scale);
-    const errors = await judge.errors(found, 'heldOut');
-    const error = meanOf(errors);
-    tried.push({ scale, error, steps: found, decibels: decibels(error), worstDecibels: decibels(Math.max(...errors)) });
-    onStep(`${decibels(error).toFixed(2)} dB in held-out views`);
-    if (error <= target && error >= NEAR_ENOUGH * target) break;
-    scale = nextScale(tried, AIMED * target);
-  }
-  tried.sort((a, b) => a.error - b.error);
-  const best = tried.findLast(({ error }) => error <= target) ?? tried[0];
+  const best = await fitSteps({
+    steps,
+    target,
+    measure: async (scaled) => {
+      const errors = await judge.errors(scaled, 'heldOut');
+      const error = meanOf(errors);
+      onStep(`${decibels(error).toFixed(2)} dB in held-out views`);
+      return { error, decibels: decibels(error), worstDecibels: decibels(Math.max(...errors)) };
+    },
+  });
   evaluator.destroy();
   return { ...best, seen };
 }

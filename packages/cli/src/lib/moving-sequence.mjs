@@ -3,6 +3,7 @@ import { boundsOf, GaussianSplatError } from '@gaussian-splat/core';
 import {
   allocateSteps,
   encodingsFor,
+  fitSteps,
   GpuEvaluator,
   scaledSteps,
   splatsOf,
@@ -88,13 +89,16 @@ async function findSteps({ first, frames, device, target, onStep }) {
     return meanOf(await judge.errors(await frameOf(first, bytes, frames.length, measured)));
   };
   const usual = { position: 0.15 * typicalSize(first), rotation: 0.1, scale: 0.1, opacity: 0.03, color: 0.05 };
-  let steps = await allocateSteps({ usual, numbers: numbersOf(frames), measure, target });
-  for (let tries = 0; tries < MOST_TRIES; tries++) {
-    const error = await measure(steps);
-    onStep(`${(-10 * Math.log10(error)).toFixed(2)} dB in a frame of the first file`);
-    if (error <= target && error >= NEAR_ENOUGH * target) break;
-    steps = scaledSteps(steps, Math.min(4, Math.max(0.25, Math.sqrt((0.93 * target) / error))));
-  }
+  const { steps } = await fitSteps({
+    steps: await allocateSteps({ usual, numbers: numbersOf(frames), measure, target }),
+    target,
+    nearEnough: NEAR_ENOUGH,
+    measure: async (scaled) => {
+      const error = await measure(scaled);
+      onStep(`${(-10 * Math.log10(error)).toFixed(2)} dB in a frame of the first file`);
+      return { error };
+    },
+  });
   judge.destroy();
   return steps;
 }

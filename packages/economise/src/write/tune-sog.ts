@@ -1,6 +1,6 @@
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
 import type { SeenSplats } from '@gaussian-splat/renderer';
-import { allocateSteps, scaledSteps } from '../allocate-steps.js';
+import { allocateSteps, fitSteps } from '../allocate-steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
 import type { Palette } from './palette.js';
 import { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './sog.js';
@@ -15,7 +15,6 @@ const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-
 const PALETTES = [1024, 4096, 8192, 16_384, 32_768, 65_536];
 /** Share of the error that goes to the palette at most, if a larger one makes less. */
 const PALETTE_SHARE = 0.4;
-const MOST_TRIES = 4;
 /** How near to what is allowed a search ends. */
 const NEAR_ENOUGH = 0.9;
 /** For files that are measured and thrown away. */
@@ -72,13 +71,13 @@ async function tuned(
   const measured = (steps: SogSteps): Promise<number> => errorOf(steps, palette);
   const ofPalette = 1.5 * (shCoefficientCount(cloud.shDegree) - 1) * Math.min(1, palette / cloud.count);
   const numbers = ofPalette > 0 ? { ...NUMBERS, harmonics: ofPalette } : NUMBERS;
-  let steps = await allocateSteps({ usual: USUAL, numbers, measure: measured, target: share });
-  for (let tries = 0; tries < MOST_TRIES; tries++) {
-    const error = await measured(steps);
-    if (error <= target && error >= NEAR_ENOUGH * target) break;
-    const own = Math.max(error - (target - share), 0.1 * error);
-    steps = scaledSteps(steps, Math.min(3, Math.max(1 / 3, Math.sqrt((0.95 * share) / own))));
-  }
+  const usual = await allocateSteps({ usual: USUAL, numbers, measure: measured, target: share });
+  const { steps } = await fitSteps({
+    steps: usual,
+    measure: async (scaled) => ({ error: await measured(scaled) }),
+    target,
+    nearEnough: NEAR_ENOUGH,
+  });
   return {
     title: `SOG version 2, steps ${Object.entries(steps)
       .map(([name, step]) => `${name} ${step.toPrecision(2)}`)
