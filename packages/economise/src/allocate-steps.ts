@@ -80,8 +80,10 @@ export async function fitSteps<K extends string, Found extends { readonly error:
 
 /** A scale is at most so many times as large, or small, as the one before. */
 const FARTHEST_SCALE = 3;
+/** Errors go with the square of the scale as a rule; where two tries tell that they grow more slowly, with this power of it at least. */
+const LEAST_SLOPE = 0.5;
 
-/** Errors go with the square of the scale, until tries above and below the figure tell more. */
+/** A scale between tries above and below the figure, or beyond those that are all on one side of it. */
 function nextScale(tried: readonly Tried[], aim: number): number {
   const [below, above] = tried.reduce<readonly [Tried?, Tried?]>(
     ([low, high], one) =>
@@ -91,8 +93,11 @@ function nextScale(tried: readonly Tried[], aim: number): number {
     [undefined, undefined],
   );
   if (below === undefined || above === undefined || above.scale <= below.scale) {
-    const { scale, error } = tried[tried.length - 1];
-    return scale * Math.min(FARTHEST_SCALE, Math.max(1 / FARTHEST_SCALE, Math.sqrt(aim / error)));
+    const [before, last] = tried.slice(-2);
+    const { scale, error } = last ?? before;
+    const slope = last ? Math.log(error / before.error) / Math.log(scale / before.scale) : 2;
+    const factor = (aim / error) ** (1 / Math.min(2, Math.max(LEAST_SLOPE, slope || 2)));
+    return scale * Math.min(FARTHEST_SCALE, Math.max(1 / FARTHEST_SCALE, factor));
   }
   const share = Math.log(aim / below.error) / Math.log(above.error / below.error);
   return below.scale * (above.scale / below.scale) ** Math.min(0.9, Math.max(0.1, share));
