@@ -225,10 +225,8 @@ async function main({
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;
-  // Within bytes, each figure that is tried is but a step of a search.
-  const searches = maxBytes === undefined ? undefined : 1;
   const reach = (minDecibels) =>
-    economise(cloud, { ...{ minDecibels, name: out, evaluator, pool, encodeWebp, searches }, onStep: say });
+    economise(cloud, { ...{ minDecibels, name: out, evaluator, pool, encodeWebp }, onStep: say });
   const [minDecibels, result] =
     maxBytes === undefined ? [asked, await reach(asked)] : await withinBytes(reach, maxBytes, say);
   writeOut(out, result.bytes);

@@ -40,8 +40,6 @@ export interface EconomiseOptions {
   /** Encodes lossless WebP, of which SOG is made: for `.sog` alone. */
   readonly encodeWebp?: EncodeWebp;
   readonly signal?: AbortSignal;
-  /** Searches at most, of formats whose steps are chosen: one that leaves more than was asked is followed by one that aims lower; default 4. */
-  readonly searches?: number;
   /** Called with what is being done. */
   readonly onStep?: (step: string) => void;
 }
@@ -70,9 +68,8 @@ const ROUNDING_SHARE = 0.6;
 /** How much less is taken where the written file misses the figure; the next time as much less again than that. The last try keeps everything. */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
-const USUAL_SEARCHES = 4;
-/** How much more than what was asked is worth another search, dB, and which part of that it aims lower. */
-const [SURPLUS, AIM_SHARE] = [0.1, 0.8];
+/** How often more is taken, of which part of what is left, and from which part of the allowed error on that is not worth another try. */
+const [MOST_MORE, MORE_SHARE, ENOUGH] = [3, 0.9, 0.98];
 const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
@@ -84,43 +81,19 @@ const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: fals
  * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, the file's name is of no known format, or views show nothing of the scene.
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
-  const watch = new Stopwatch();
-  const { minDecibels, searches = USUAL_SEARCHES } = options;
-  let best = await economiseTo(meanSquareOf(minDecibels), cloud, options, watch);
-  if (!encodingsFor(options.name, cloud, options).some(({ tune }) => tune)) return best;
-  // What steps, palettes and cuts make together comes in jumps: a search that aims lower may find a smaller file that is still near enough.
-  let [aim, tooLow] = [minDecibels, -Infinity];
-  for (let tries = 1; tries < searches && best.decibels > minDecibels + SURPLUS; tries++) {
-    const next = Math.max(aim - AIM_SHARE * (best.decibels - minDecibels), (aim + tooLow) / 2);
-    options.onStep?.(`another search, for ${next.toFixed(2)} dB`);
-    const other = await economiseTo(meanSquareOf(next), cloud, options, watch).catch((error: unknown) => {
-      if (error instanceof GaussianSplatError && error.code === 'argument/value') return undefined;
-      throw error;
-    });
-    const isSmaller = other && other.decibels >= minDecibels && other.bytes.length < best.bytes.length;
-    [aim, tooLow, best] = isSmaller ? [next, tooLow, other] : [aim, next, best];
-  }
-  return { ...best, seconds: watch.seconds };
-}
-
-/** @param target mean squared error that is searched for */
-async function economiseTo(
-  target: number,
-  cloud: GaussianCloud,
-  options: EconomiseOptions,
-  watch: Stopwatch,
-): Promise<Economised> {
-  const { evaluator, pool = inline, signal, onStep = () => undefined } = options;
+  const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
   const encodings = encodingsFor(options.name, cloud, options);
+  const watch = new Stopwatch();
   onStep(`scoring ${cloud.count} splats`);
   const ranking = await evaluator.rank(signal);
   watch.lap('score');
+  const target = meanSquareOf(minDecibels);
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
   const budget = Math.max(0, target - rounding);
   const { hasOneDegree } = encoding;
   const fitting = { signal, onStep, hasOneDegree };
-  const trades = await findTrades(cloud, ranking, evaluator, budget, fitting);
+  const trades = await findTrades(cloud, ranking, evaluator, encoding.coarser ? target : budget, fitting);
   watch.lap('search');
   let plan: Plan = { trades, filling: await scaleToFit(trades, evaluator, budget, fitting), isRefined: false };
   watch.lap('fit');
@@ -132,27 +105,65 @@ async function economiseTo(
     if (refined && taken(refined) < taken(ready)) [plan, ready] = [refined.plan, refined];
     watch.lap('refine');
   }
-  for (let tries = 1; ; tries++) {
-    const { cut, reduced } = ready ?? (await cutCloud(plan, evaluator, budget, signal));
-    const bytes = await encoding.write(reduced, pool);
+  const write = async ({ cut, reduced }: CutCloud, by = encoding): Promise<Written> => {
+    const bytes = await by.write(reduced, pool);
     const written = await readInParts(bytes, { name: options.name, signal }, pool);
     watch.lap('write');
     const errors = await evaluator.compare(written, 'heldOut', signal);
     watch.lap('judge');
     const error = errorTogether(errors, 'heldOut');
     onStep(`held-out views: ${decibels(error).toFixed(2)} dB`);
-    if (error <= target)
-      return {
-        ...summary(cloud, reduced, cut, errors),
-        bytes: unshared(bytes),
-        encoding: encoding.title,
-        seconds: watch.seconds,
-      };
-    if (plan === WHOLE) throw unreachable(options, atMost(error));
-    const isLast = tries + 1 >= MAX_TRIES || plan.filling === 0;
-    plan = isLast ? WHOLE : { ...plan, filling: SHRINK ** tries * plan.filling };
-    ready = undefined;
+    return { error, bytes, cut, reduced, errors, encoding: by };
+  };
+  let found = await write(ready ?? (await cutCloud(plan, evaluator, budget, signal)));
+  for (let tries = 2; found.error > target; tries++) {
+    if (plan === WHOLE) throw unreachable(options, atMost(found.error));
+    const isLast = tries >= MAX_TRIES || plan.filling === 0;
+    plan = isLast ? WHOLE : { ...plan, filling: SHRINK ** (tries - 1) * plan.filling };
+    found = await write(await cutCloud(plan, evaluator, budget, signal));
   }
+  const { coarser } = encoding;
+  if (coarser && rounding > 0) {
+    found = await takeMore(found, target, (extra) => write(found, coarser(Math.sqrt(1 + extra / rounding))));
+    if (!plan.isRefined && plan !== WHOLE) {
+      found = await takeMore(found, target, async (extra) => {
+        const allowed = budget + extra;
+        const filling = await scaleToFit(trades, evaluator, allowed, fitting);
+        return write(await cutCloud({ ...plan, filling }, evaluator, allowed, signal), found.encoding);
+      });
+    }
+  }
+  const { bytes, cut, reduced, errors } = found;
+  return {
+    ...summary(cloud, reduced, cut, errors),
+    bytes: unshared(bytes),
+    encoding: found.encoding.title,
+    seconds: watch.seconds,
+  };
+}
+
+/** A file, read again and judged. */
+interface Written extends CutCloud {
+  readonly encoding: Encoding;
+  readonly bytes: Uint8Array;
+  /** Of each held-out view, and of all together. */
+  readonly errors: readonly number[];
+  readonly error: number;
+}
+
+/**
+ * Takes what a file leaves of the error that is allowed: its rounding was measured in other views, and cuts come in jumps.
+ * @param take writes a file that errs so much more, about
+ */
+async function takeMore(found: Written, target: number, take: (extra: number) => Promise<Written>): Promise<Written> {
+  let [best, low, high] = [found, 0, Infinity];
+  for (let tries = 0; tries < MOST_MORE && best.error < ENOUGH * target; tries++) {
+    const next = Math.min(low + MORE_SHARE * (target - best.error), (low + high) / 2);
+    const other = await take(next);
+    if (other.error > target || other.bytes.length >= best.bytes.length) high = next;
+    else [best, low] = [other, next];
+  }
+  return best;
 }
 
 /** The smallest way to write the scene whose rounding leaves room for more. Where there is but one, the written file alone is judged. */

@@ -1,6 +1,6 @@
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
 import type { SeenSplats } from '@gaussian-splat/renderer';
-import { allocateSteps, fitSteps } from '../allocate-steps.js';
+import { allocateSteps, fitSteps, scaledSteps } from '../allocate-steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
 import type { Palette } from './palette.js';
 import { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './sog.js';
@@ -34,16 +34,25 @@ export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false):
     },
     tune: async (whole, measure, target, seen) => {
       if (encodeWebp === undefined) throw withoutWebp();
-      const { title, options } = await tuned(whole, measure, target, encodeWebp, seen);
-      return {
-        title: `${isStreamed ? 'streamed ' : ''}${title}`,
-        hasOneDegree: true,
-        write: async ({ cloud, kept }) => {
-          const own = { ...options, seen: seen && kept ? splatsSeen(seen, kept) : seen };
-          return isStreamed ? writeZip(await writeStreamedSog(cloud, own)) : writeSog(cloud, own);
-        },
-      };
+      const options = await tuned(whole, measure, target, encodeWebp, seen);
+      return tunedSog(options, whole.cloud.shDegree > 0, isStreamed);
     },
+  };
+}
+
+function tunedSog(options: SogOptions, hasHarmonics: boolean, isStreamed: boolean): Encoding {
+  const { steps, palette, seen } = options;
+  const told = Object.entries(steps).filter(([name]) => hasHarmonics || name !== 'harmonics');
+  const list = told.map(([name, step]) => `${name} ${step.toPrecision(2)}`).join(', ');
+  const title = `SOG version 2, steps ${list}${hasHarmonics ? `, palette ${palette}` : ''}`;
+  return {
+    title: `${isStreamed ? 'streamed ' : ''}${title}`,
+    hasOneDegree: true,
+    write: async ({ cloud, kept }) => {
+      const own = { ...options, seen: seen && kept ? splatsSeen(seen, kept) : seen };
+      return isStreamed ? writeZip(await writeStreamedSog(cloud, own)) : writeSog(cloud, own);
+    },
+    coarser: (factor) => tunedSog({ ...options, steps: scaledSteps(steps, factor) }, hasHarmonics, isStreamed),
   };
 }
 
@@ -53,7 +62,7 @@ async function tuned(
   target: number,
   encodeWebp: EncodeWebp,
   seen: SeenSplats | undefined,
-): Promise<{ title: string; options: SogOptions }> {
+): Promise<SogOptions> {
   const palettes = new Map<number, Palette>();
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
     measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK, seen, palettes }));
@@ -78,12 +87,7 @@ async function tuned(
     target,
     nearEnough: NEAR_ENOUGH,
   });
-  return {
-    title: `SOG version 2, steps ${Object.entries(steps)
-      .map(([name, step]) => `${name} ${step.toPrecision(2)}`)
-      .join(', ')}${cloud.shDegree > 0 ? `, palette ${palette}` : ''}`,
-    options: { steps, palette, encodeWebp },
-  };
+  return { steps, palette, encodeWebp, seen };
 }
 
 /** How some of the splats are seen. */
