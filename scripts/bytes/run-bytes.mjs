@@ -77,6 +77,23 @@ function make(path, command, args) {
 
 const own = (...args) => [join(root, 'packages/cli/bin/gaussian-splat.mjs'), ...args];
 
+/** Signs of coefficients in a half turn about x. */
+const HALF_TURN = [1, -1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1];
+
+/** The cloud turned by half a turn about x: splat-transform 3.7.0 writes SPZ in the frame of PLY (docs/decisions/0022). */
+function halfTurned(cloud) {
+  const numbers = 3 * (cloud.shDegree + 1) ** 2;
+  return {
+    ...cloud,
+    positions: cloud.positions.map((value, k) => (k % 3 === 0 ? value : -value)),
+    rotations: cloud.rotations.map((_, k, all) => {
+      const [w, x, y, z] = all.subarray(k - (k % 4), k - (k % 4) + 4);
+      return [-x, w, -z, y][k % 4];
+    }),
+    sh: cloud.sh.map((value, k) => HALF_TURN[Math.floor((k % numbers) / 3)] * value),
+  };
+}
+
 async function read(path) {
   const openPart = async (part) => new Uint8Array(readFileSync(join(path, '..', part)));
   return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openPart });
@@ -147,16 +164,17 @@ async function measure(scene, { source, files }, device) {
       `  ${name.padEnd(28)} ${(bytes / cloud.count).toFixed(2)} bytes a splat, ${worst.toFixed(2)} dB, ${decodeMs.toFixed(0)} ms`,
     );
   };
-  const file = async (name, isOwn, at) => {
+  const file = async (name, isOwn, at, turn = (found) => found) => {
     const [ms, found] = await timed(() => read(at));
     const { size } = statSync(at);
-    await note(name, isOwn, size, size, ms, found);
+    await note(name, isOwn, size, size, ms, turn(found));
   };
   for (const [name, at] of Object.entries(files)) await file(name, false, path(at));
   for (const [name, extension] of Object.entries(TRANSFORMED)) {
     if (Object.keys(files).some((other) => other.startsWith(name))) continue;
     const args = ['--yes', TRANSFORM, '-q', '-w', '-g', 'cpu', path(source), made(extension)];
-    if (make(made(extension), 'npx', args)) await file(name, false, made(extension));
+    if (make(made(extension), 'npx', args))
+      await file(name, false, made(extension), extension === 'spz' ? halfTurned : undefined);
   }
   writeFileSync(made('splat'), writeSplat(cloud));
   await file('splat', false, made('splat'));
