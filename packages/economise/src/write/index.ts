@@ -24,7 +24,7 @@ export interface Encoding {
   readonly write: (reduced: WrittenCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
   /** True if every splat takes as many coefficients as the one with the most: fewer bands of some save nothing. */
   readonly hasOneDegree?: boolean;
-  /** The same with steps so many times as large, for an encoding whose steps {@link tune} chose. */
+  /** The same encoding with all steps multiplied by a factor, if {@link tune} chose them. */
   readonly coarser?: (factor: number) => Encoding;
   /**
    * Chooses how precise it is: such that the rounding of a scene is at most this.

@@ -32,7 +32,7 @@ const SIZE_RANK = 0.35;
 /** The splat that the first class is of: so many weigh less. */
 const REFERENCE_RANK = 0.9;
 /** How much larger steps are above the finest level, in octaves: such levels are so far off that what they round is far less than what they leave out. */
-const COARSE: Octaves = { place: 4, size: 3, direction: 4, opacity: 3, color: 2, harmonics: 4 };
+const COARSE: Octaves = { place: 4, size: 2, direction: 2, opacity: 2, color: 1, harmonics: 2 };
 const FINEST: Octaves = { place: 0, size: 0, direction: 0, opacity: 0, color: 0, harmonics: 0 };
 
 type Octaves = Readonly<Record<'place' | 'size' | 'direction' | 'opacity' | 'color' | 'harmonics', number>>;
@@ -118,7 +118,7 @@ class Planes {
   }
 }
 
-/** What {@link PageEncoder} is told of a scene. */
+/** What {@link PageEncoder} takes besides a tree and its coding. */
 export interface PageEncoderOptions {
   /** Compresses a piece of a file. */
   readonly deflate: Deflate;
