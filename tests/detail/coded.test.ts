@@ -157,6 +157,28 @@ test('coarser levels, which are far from the scene anyway, have coarser coordina
   assert.ok(coarse > 4 * fine, `${coarse} and ${fine} between two coordinates`);
 });
 
+test('coarser levels keep the harmonics that show', async () => {
+  const tree = buildDetailTree(withHarmonics(pebbles(6_000), 2), { geometry: 'quantized' });
+  const [usual, fine] = await Promise.all(
+    [USUAL_STEPS, FINE].map(async (steps) => {
+      const coding = codingOf(steps);
+      const encoder = new PageEncoder(tree, coding, { deflate });
+      const parts = [];
+      for (const page of cutPages(tree)) {
+        const { chunks, upper, holds } = page;
+        const words = new Uint32Array(
+          await decodePage('page', encoder.encode(page), { chunks, upper, shDegree: 2, coding }),
+        );
+        parts.push({ words, of: chunks, chunks: holds.flatMap(([level], chunk) => (level === 1 ? [chunk] : [])) });
+      }
+      const { sh } = cloudOfChunks(manifestOf(tree, [], String, coding), parts);
+      return sh.reduce((sum, value, k) => sum + (k % 27 < 3 ? 0 : value * value), 0);
+    }),
+  );
+  console.log(`energy of the harmonics of the first coarser level: ${(usual / fine).toFixed(2)} of the whole`);
+  assert.ok(usual / fine > 0.6 && usual / fine < 1.1, `${usual / fine}`);
+});
+
 /** dB of a streamed scene, all of whose pages are there, from the scene that was loaded whole. */
 async function closenessOf(cloud: GaussianCloud, steps: PageSteps): Promise<{ decibels: number; bytes: number }> {
   const device = await anyDevice();
