@@ -22,7 +22,7 @@ const USAGE = `usage: npm run lab:bytes -- [options]
   --out FOLDER     where bytes.json and bytes.svg go (default docs/frontier)
   --scenes A,B     of skull, playbot3, st-peter (default all); others keep their figures
   --views N        held-out views (default 8)
-  --scored N       views that score splats (default 24; 216 is what the commands take by themselves, on a GPU)
+  --scored N       views that score splats (default 24; 216 is the default of the commands, for a GPU)
   --kept           of what takes long to make only what is in --work
 `;
 

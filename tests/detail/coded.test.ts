@@ -83,7 +83,7 @@ for (const degree of [0, 1, 2, 3] as const) {
       found.forEach((number, k) => {
         const [level] = holds[Math.floor((k * chunks) / layout.chunks)];
         const size = Math.max(1e-3, Math.abs(asked[k]));
-        const most = (level === 0 ? 0.03 : 0.1) * size;
+        const most = (level === 0 ? 0.03 : 0.05) * size;
         assert.ok(Math.abs(number - asked[k]) <= most, `bound ${k}: ${number}, not ${asked[k]}`);
       });
       const leaves = holds.flatMap(([level], chunk) => (level === 0 ? [chunk] : []));

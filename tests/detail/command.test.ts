@@ -92,6 +92,7 @@ test('arguments that make no sense are told of in a line, without a trace of the
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '2x2', '--spacing', 'Infinity'],
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '20x2', '--spacing', '1e38'],
     [/--min-db: expected 30 to 60/, scene, '--out', out, '--min-db', '70'],
+    [/--scored: expected a whole number from 24 to 2000/, scene, '--out', out, '--scored', '5'],
     [/--degree/, scene, '--out', out, '--degree', '4'],
   ];
   for (const [expected, ...args] of someOf(cases, 3)) {

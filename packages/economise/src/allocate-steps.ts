@@ -78,7 +78,7 @@ export async function fitSteps<K extends string, Found extends { readonly error:
   return tried.findLast(({ error }) => error <= target) ?? tried[0];
 }
 
-/** A scale is at most so many times as large, or small, as the one before. */
+/** How many times as large, or small, as the one before a scale is at most. */
 const FARTHEST_SCALE = 3;
 /** Errors go with the square of the scale as a rule; where two tries tell that they grow more slowly, with this power of it at least. */
 const LEAST_SLOPE = 0.5;

@@ -153,7 +153,7 @@ interface Written extends CutCloud {
 
 /**
  * Takes what a file leaves of the error that is allowed: its rounding was measured in other views, and cuts come in jumps.
- * @param take writes a file that errs so much more, about
+ * @param take writes a file whose error is larger by about `extra`
  */
 async function takeMore(found: Written, target: number, take: (extra: number) => Promise<Written>): Promise<Written> {
   let [best, low, high] = [found, 0, Infinity];

@@ -29,11 +29,11 @@ export {
   codingOf,
   PageEncoder,
   USUAL_STEPS,
-  type Deflate,
   type PageEncoderOptions,
   type PageSteps,
   type WrittenCoding,
 } from './detail/encode-page.js';
+export type { Deflate } from './detail/page-planes.js';
 export { cloudOfChunks, type PageChunks } from './detail/page-cloud.js';
 export type { CodedFile, PageCoding } from './detail/page-coding.js';
 export { roundedBy, SeenRounder } from './detail/round-harmonics.js';

@@ -1,7 +1,8 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import { packedOrder, roundedBy, SeenRounder, weighSplats, type SeenSplats } from '@gaussian-splat/renderer';
+import { packedOrder, type SeenSplats } from '@gaussian-splat/renderer';
 import type { Steps } from '../allocate-steps.js';
 import { findPalette, type Palette } from './palette.js';
+import { addedBy, DIGITS, roundPalette, weightsOf } from './sog-palette.js';
 import { writeZip } from './zip.js';
 
 /**
@@ -41,12 +42,6 @@ const MOST_PLACES = 65_535;
 const PALETTE_ROW = 64;
 /** Codes of a codebook; where steps leave more, larger ones are taken. */
 const MOST_CODES = 255;
-/** The code of 0 in the palette; codes nearer to it than {@link EVEN_CODES} are evenly spaced, and the largest is at most {@link MOST_BENT} steps. */
-const [MIDDLE_CODE, EVEN_CODES, MOST_BENT] = [127, 48, 2000];
-/** The entry that has the usual step, so many weigh less; and how many octaves larger that of others is at most. */
-const [REFERENCE_RANK, MOST_OCTAVES] = [0.9, 5];
-/** Of the values of a codebook: more are more bytes, and finer than any step. */
-const DIGITS = 6;
 const LN2 = Math.LN2;
 
 /** Writes SOG version 2 as a bundle. */
@@ -243,132 +238,6 @@ function harmonicsOf(
     ]),
     added: addedBy((k, n) => values[codes[width * labels[k] + n]] - vectors[width * k + n], order, width, seen),
   };
-}
-
-interface RoundedPalette {
-  /** [size, width], {@link MIDDLE_CODE} for 0 */
-  readonly codes: Uint8Array;
-  /** The entries have another order: those with equal steps are together, and in each such part as they are met first. */
-  readonly labels: Uint32Array;
-  /** The codebook. */
-  readonly values: readonly number[];
-}
-
-/** Rounds entries, each as coarsely as what shows it allows, to what is seen of the splat that shows it most. */
-function roundPalette(
-  { entries, labels, size }: Palette,
-  told: { order: Uint32Array; weights: Float32Array; seen: SeenSplats | undefined; step: number },
-): RoundedPalette {
-  const { order, weights, seen, step } = told;
-  const width = entries.length / size;
-  const sums = new Float32Array(size);
-  const heaviest = new Uint32Array(size);
-  const met: number[] = [];
-  const isMet = new Uint8Array(size);
-  labels.forEach((label, k) => {
-    if (isMet[label] === 0) {
-      met.push(label);
-      [isMet[label], heaviest[label]] = [1, k];
-    } else if (weights[k] > weights[heaviest[label]]) heaviest[label] = k;
-    sums[label] += weights[k];
-  });
-  const reference = sums.slice().sort()[Math.floor(REFERENCE_RANK * (size - 1))];
-  const octaves = Uint8Array.from(sums, (sum) =>
-    Math.min(MOST_OCTAVES, Math.max(0, Math.round(Math.log2(reference / Math.max(1e-36, sum)) / 2))),
-  );
-  // Neighbours in the image with equal steps share codes.
-  const numbers = new Uint32Array(size);
-  met.sort((a, b) => octaves[a] - octaves[b]).forEach((entry, number) => (numbers[entry] = number));
-  const scale = new CodeScale(
-    step,
-    entries.reduce((most, value) => Math.max(most, Math.abs(value)), 0),
-  );
-  const codes = new Uint8Array(entries.length);
-  const rounder = new SeenRounder(width / 3 + 1, seen);
-  for (let entry = 0; entry < size; entry++) {
-    const unit = 2 ** octaves[entry];
-    const [from, to] = [width * entry, width * numbers[entry]];
-    rounder.round(
-      order[heaviest[entry]],
-      (k) => entries.subarray(from + 3 * (k - 1), from + 3 * k) as unknown as readonly number[],
-      (value, weight, k, n) => {
-        const code = Math.sign(value) * scale.codeOf(Math.abs(value), unit, weight);
-        codes[to + 3 * (k - 1) + n] = MIDDLE_CODE + code;
-        return scale.valueOf(code);
-      },
-    );
-  }
-  const values = Array.from({ length: 2 * MIDDLE_CODE + 1 }, (_, k) =>
-    Number(scale.valueOf(k - MIDDLE_CODE).toPrecision(DIGITS)),
-  );
-  return { codes, labels: labels.map((label) => numbers[label]), values };
-}
-
-/** Values of codes -127 to 127: so many steps, and where that does not reach far enough, farther apart the farther from 0. */
-class CodeScale {
-  readonly #step: number;
-  readonly #bend: number;
-
-  constructor(step: number, most: number) {
-    this.#step = Math.max(step, most / MOST_BENT);
-    this.#bend = Math.max(0, most / this.#step - MIDDLE_CODE) / (MIDDLE_CODE - EVEN_CODES) ** 2;
-  }
-
-  valueOf(code: number): number {
-    const size = Math.abs(code);
-    return Math.sign(code) * this.#step * (size + this.#bend * Math.max(0, size - EVEN_CODES) ** 2);
-  }
-
-  /** @param unit codes are multiples of it */
-  codeOf(value: number, unit: number, weight: number): number {
-    const steps = value / this.#step - EVEN_CODES;
-    const bent = this.#bend > 0 && steps > 0 ? (Math.sqrt(1 + 4 * this.#bend * steps) - 1) / (2 * this.#bend) : steps;
-    const code = unit * roundedBy((EVEN_CODES + bent) / unit, weight);
-    return Math.min(code, unit * Math.floor(MIDDLE_CODE / unit));
-  }
-}
-
-/** What an error of each splat shows. */
-function weightsOf(
-  { opacities, scales }: GaussianCloud,
-  order: Uint32Array,
-  seen: SeenSplats | undefined,
-): Float32Array {
-  const usual = Float32Array.from(order, (i) => {
-    const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
-    // Opacity squared, times the area.
-    return opacities[i] ** 2 * (Math.max(a * b, b * c, a * c) + 1e-20);
-  });
-  return seen
-    ? weighSplats(
-        usual,
-        Float32Array.from(order, (i) => seen.energies[i]),
-      ).weights
-    : usual;
-}
-
-/**
- * Constant coefficients of the colours that views see of some harmonics, in the mean: with M the mean of Y Yᵀ, the sum of M_j0 / M_00 times coefficient j; a root of M has the same quotients in its first column.
- * @param of coefficient and channel `n` of the splat at place k of the order
- */
-function addedBy(
-  of: (k: number, n: number) => number,
-  order: Uint32Array,
-  width: number,
-  seen: SeenSplats | undefined,
-): Float32Array {
-  const added = new Float32Array(3 * order.length);
-  if (!seen?.roots.length) return added;
-  const numbers = ((width / 3 + 1) * (width / 3 + 2)) / 2;
-  order.forEach((i, k) => {
-    if (!(seen.energies[i] > 0)) return;
-    const root = seen.roots.subarray(numbers * i, numbers * (i + 1));
-    for (let n = 0; n < width; n++) {
-      const j = 1 + Math.floor(n / 3);
-      added[3 * k + (n % 3)] += (root[(j * (j + 1)) / 2] / root[0]) * of(k, n);
-    }
-  });
-  return added;
 }
 
 export function nothingToWrite(): GaussianSplatError {

@@ -7,19 +7,17 @@ import {
   CHUNK_FLOATS,
   CLASS_STEP,
   CLASSES,
-  DIFFERENCES,
   FILE_FLOATS,
-  headBytes,
   interleaved,
   LEAST_OPACITY_STEP,
   MIDDLE,
-  PLAIN,
   PLANES,
-  planesOf,
   type PageCoding,
 } from './page-coding.js';
+import { headOf, joined, Planes, type Deflate } from './page-planes.js';
 import { differencesOf, HarmonicRounder } from './round-harmonics.js';
-import { weighSplats, type SeenSplats } from './seen-splats.js';
+import type { SeenSplats } from './seen-splats.js';
+import { numberOf, SplatWeights } from './splat-weights.js';
 import { directionIn2, directionIn3, rowLengths } from './quantized-geometry.js';
 import { FACTOR_NUMBERS, shNumbers, type SplatLevel } from './splat-level.js';
 
@@ -27,11 +25,9 @@ const { CULL_GROUP, ALPHA_MIN, QUANTIZED_OPAQUE, QUANTIZED_T_ZERO, QUANTIZED_UV_
 const MOST_PLACES = 65_535;
 const MOST_SIZES = 255;
 const MOST_COLOR = 32_000;
-/** The splat of a chunk whose size coordinates are rounded by: so many of the chunk are smaller. */
+/** The share of a chunk's splats that are smaller than the one whose size coordinates are rounded by. */
 const SIZE_RANK = 0.35;
-/** The splat that the first class is of: so many weigh less. */
-const REFERENCE_RANK = 0.9;
-/** How much larger steps are above the finest level, in octaves: such levels are so far off that what they round is far less than what they leave out. */
+/** How much larger steps are above the finest level, in octaves: such levels are far off, and leave out much more than they round. */
 const COARSE: Octaves = { place: 4, size: 2, direction: 2, opacity: 2, color: 1, harmonics: 2 };
 const FINEST: Octaves = { place: 0, size: 0, direction: 0, opacity: 0, color: 0, harmonics: 0 };
 
@@ -59,9 +55,6 @@ export const USUAL_STEPS: PageSteps = {
   harmonics: 1 / 40,
 };
 
-/** What compresses bytes to a piece of a raw deflate stream that others are put behind: it ends with a sync flush. */
-export type Deflate = (bytes: Uint8Array) => Uint8Array;
-
 /** What a writer has to know besides. */
 export interface WrittenCoding extends PageCoding {
   /** Between two coordinates, as a part of how large splats of the chunk are. */
@@ -81,41 +74,6 @@ export function codingOf(steps: PageSteps): WrittenCoding {
     scale: Math.min(255 - CLASS_STEP * (CLASSES - 1), Math.max(0, scale)),
     place: steps.place,
   };
-}
-
-/** What the planes of a file are made of: values in the order of its splats, chunk by chunk. */
-class Planes {
-  readonly bytes: Uint8Array[];
-  count = 0;
-  #classed = 0;
-  #lower: readonly [count: number, classed: number] = [0, 0];
-
-  constructor(splats: number, degree: SplatLevel['shDegree']) {
-    this.bytes = Array.from({ length: planesOf(degree) }, () => new Uint8Array(splats));
-  }
-
-  put(plane: number, value: number): void {
-    this.bytes[plane][this.count] = value & 255;
-  }
-
-  /** Coefficients above the constant one, of a class above 0. */
-  putHarmonics(codes: Int8Array): void {
-    codes.forEach((code, k) => (this.bytes[PLANES.harmonics + k][this.#classed] = code & 255));
-    this.#classed++;
-  }
-
-  /** Says that what comes now is of a finer level. */
-  beginLower(): void {
-    this.#lower = [this.count, this.#classed];
-  }
-
-  /** Planes, and where in each those of the finer level begin. Splats that have harmonics are fewer. */
-  get whole(): { plane: Uint8Array; lower: number }[] {
-    const [all, classed] = this.#lower;
-    return this.bytes.map((plane, k) =>
-      k < PLANES.harmonics ? { plane, lower: all } : { plane: plane.subarray(0, this.#classed), lower: classed },
-    );
-  }
 }
 
 /** What {@link PageEncoder} takes besides a tree and its coding. */
@@ -271,40 +229,6 @@ function largestOf({ factors }: SplatLevel, first: number, count: number): numbe
   return largest;
 }
 
-/** How much an error of a splat's colour adds to the squared error of pictures: the square of its opacity, times the area that it covers. */
-function weightOf({ factors, opacities }: SplatLevel, i: number): number {
-  const lengths = new Float64Array(3);
-  rowLengths(factors, FACTOR_NUMBERS * i, lengths);
-  lengths.sort();
-  return opacities[i] ** 2 * lengths[1] * lengths[2];
-}
-
-/** How many octaves splats weigh less than those that show much. */
-class SplatWeights {
-  readonly #leaves: SplatLevel;
-  /** Of the leaves. */
-  readonly #weights: Float32Array;
-  readonly #unit: number;
-  /** The weight that the first class is of. */
-  readonly #reference: number;
-
-  constructor(leaves: SplatLevel, energies: Float32Array | undefined) {
-    this.#leaves = leaves;
-    const usual = Float32Array.from({ length: leaves.count }, (_, i) => weightOf(leaves, i));
-    const own = energies && usual.map((_, i) => energies[numberOf(leaves, i)]);
-    ({ weights: this.#weights, unit: this.#unit } = own ? weighSplats(usual, own) : { weights: usual, unit: 1 });
-    this.#reference = this.#weights.slice().sort()[Math.floor(REFERENCE_RANK * (leaves.count - 1))];
-  }
-
-  below(level: SplatLevel, i: number): number {
-    const weight = level === this.#leaves ? this.#weights[i] : this.#unit * weightOf(level, i);
-    return Math.log2(this.#reference / Math.max(1e-36, weight)) / 2;
-  }
-}
-
-/** The number of a level's splat in the arrays that its harmonics are in. */
-const numberOf = ({ shOrder }: SplatLevel, i: number): number => (shOrder ? shOrder[i] : i);
-
 /** Of the least extents of splats, the one that {@link SIZE_RANK} of them are below. */
 function typicalSize({ factors }: SplatLevel, first: number, count: number): number {
   const lengths = new Float64Array(3);
@@ -351,80 +275,5 @@ function putShape(
 const stepOf = ({ scale }: PageCoding, own: number): number =>
   2 ** ((scale + CLASS_STEP * (own - 1)) / SCALE_STEPS - SCALE_BIAS) / 127;
 
-/** The nearest multiple of so many steps. */
+/** The nearest multiple of 2^octaves steps. */
 const roundedTo = (steps: number, octaves: number): number => 2 ** octaves * Math.round(steps / 2 ** octaves);
-
-/** The bytes before the planes; how these are told is not known yet. */
-function headOf(counts: readonly number[], floats: Float32Array, file: Parameters<typeof headBytes>[0]): Uint8Array {
-  const head = new Uint8Array(headBytes(file));
-  head.set(counts.map((count) => count - 1));
-  const words = new Uint32Array(floats.buffer);
-  words.forEach((word, k) => {
-    for (let byte = 0; byte < 4; byte++) head[counts.length + byte * words.length + k] = word >>> (8 * byte);
-  });
-  return head;
-}
-
-/** An empty last block of a deflate stream. */
-const END = Uint8Array.of(3, 0);
-
-function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Deflate): Uint8Array<ArrayBuffer> {
-  const runs = new Runs(deflate);
-  planes.forEach(({ plane, lower }, k) => {
-    const differences = plane.map((byte, i) => byte - (i > 0 ? plane[i - 1] : 0));
-    const [plain, changed] = [plane, differences].map((bytes) => partsOf(bytes, lower, deflate));
-    const mode = lengthOf(changed) < lengthOf(plain) ? DIFFERENCES : PLAIN;
-    head[head.length - planes.length + k] = mode;
-    (mode === PLAIN ? plain : changed).forEach((part) => runs.add(part));
-  });
-  return concatenated([deflate(head), ...runs.pieces, END]);
-}
-
-/** Bytes, and what they are compressed to. */
-interface Piece {
-  readonly bytes: Uint8Array;
-  readonly deflated: Uint8Array;
-}
-
-const pieceOf = (bytes: Uint8Array, deflate: Deflate): Piece => ({ bytes, deflated: deflate(bytes) });
-
-const lengthOf = (pieces: readonly Piece[]): number => pieces.reduce((sum, { deflated }) => sum + deflated.length, 0);
-
-/** A plane in one piece, or in two where each is better off with codes of its own. */
-function partsOf(bytes: Uint8Array, at: number, deflate: Deflate): Piece[] {
-  const whole = [pieceOf(bytes, deflate)];
-  if (at === 0 || at === bytes.length) return whole;
-  const parts = [bytes.subarray(0, at), bytes.subarray(at)].map((part) => pieceOf(part, deflate));
-  return lengthOf(parts) < lengthOf(whole) ? parts : whole;
-}
-
-/** Pieces one behind the other: those that are alike share their codes. */
-class Runs {
-  readonly #deflate: Deflate;
-  readonly #runs: Piece[] = [];
-
-  constructor(deflate: Deflate) {
-    this.#deflate = deflate;
-  }
-
-  add(piece: Piece): void {
-    const last = this.#runs.at(-1);
-    const both = last && pieceOf(concatenated([last.bytes, piece.bytes]), this.#deflate);
-    if (both && both.deflated.length < lengthOf([last, piece])) this.#runs[this.#runs.length - 1] = both;
-    else this.#runs.push(piece);
-  }
-
-  get pieces(): Uint8Array[] {
-    return this.#runs.map(({ deflated }) => deflated);
-  }
-}
-
-function concatenated(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
-  const all = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const piece of pieces) {
-    all.set(piece, at);
-    at += piece.length;
-  }
-  return all;
-}

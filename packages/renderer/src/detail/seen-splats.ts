@@ -8,7 +8,7 @@ export interface SeenSplats {
   readonly roots: Float32Array;
 }
 
-/** What no view shows of a splat may still be seen from elsewhere: so much of what one in plain sight would have. */
+/** What no view shows of a splat may still be seen from elsewhere: its share of the energy that it would have in plain sight. */
 const LEAST_SHARE = 1 / 64;
 
 /**

@@ -1,0 +1,120 @@
+import { DIFFERENCES, headBytes, PLAIN, PLANES, planesOf } from './page-coding.js';
+import type { SplatLevel } from './splat-level.js';
+
+/** What compresses bytes to a piece of a raw deflate stream that others are put behind: it ends with a sync flush. */
+export type Deflate = (bytes: Uint8Array) => Uint8Array;
+
+/** What the planes of a file are made of: values in the order of its splats, chunk by chunk. */
+export class Planes {
+  readonly bytes: Uint8Array[];
+  count = 0;
+  #classed = 0;
+  #lower: readonly [count: number, classed: number] = [0, 0];
+
+  constructor(splats: number, degree: SplatLevel['shDegree']) {
+    this.bytes = Array.from({ length: planesOf(degree) }, () => new Uint8Array(splats));
+  }
+
+  put(plane: number, value: number): void {
+    this.bytes[plane][this.count] = value & 255;
+  }
+
+  /** Coefficients above the constant one, of a class above 0. */
+  putHarmonics(codes: Int8Array): void {
+    codes.forEach((code, k) => (this.bytes[PLANES.harmonics + k][this.#classed] = code & 255));
+    this.#classed++;
+  }
+
+  /** Says that what comes now is of a finer level. */
+  beginLower(): void {
+    this.#lower = [this.count, this.#classed];
+  }
+
+  /** Planes, and where in each those of the finer level begin. Splats that have harmonics are fewer. */
+  get whole(): { plane: Uint8Array; lower: number }[] {
+    const [all, classed] = this.#lower;
+    return this.bytes.map((plane, k) =>
+      k < PLANES.harmonics ? { plane, lower: all } : { plane: plane.subarray(0, this.#classed), lower: classed },
+    );
+  }
+}
+
+/** The bytes before the planes; how these are told is not known yet. */
+export function headOf(
+  counts: readonly number[],
+  floats: Float32Array,
+  file: Parameters<typeof headBytes>[0],
+): Uint8Array {
+  const head = new Uint8Array(headBytes(file));
+  head.set(counts.map((count) => count - 1));
+  const words = new Uint32Array(floats.buffer);
+  words.forEach((word, k) => {
+    for (let byte = 0; byte < 4; byte++) head[counts.length + byte * words.length + k] = word >>> (8 * byte);
+  });
+  return head;
+}
+
+/** An empty last block of a deflate stream. */
+const END = Uint8Array.of(3, 0);
+
+/** The file of some planes: pieces of a deflate stream, one behind the other. */
+export function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Deflate): Uint8Array<ArrayBuffer> {
+  const runs = new Runs(deflate);
+  planes.forEach(({ plane, lower }, k) => {
+    const differences = plane.map((byte, i) => byte - (i > 0 ? plane[i - 1] : 0));
+    const [plain, changed] = [plane, differences].map((bytes) => partsOf(bytes, lower, deflate));
+    const mode = lengthOf(changed) < lengthOf(plain) ? DIFFERENCES : PLAIN;
+    head[head.length - planes.length + k] = mode;
+    (mode === PLAIN ? plain : changed).forEach((part) => runs.add(part));
+  });
+  return concatenated([deflate(head), ...runs.pieces, END]);
+}
+
+/** Bytes, and what they are compressed to. */
+interface Piece {
+  readonly bytes: Uint8Array;
+  readonly deflated: Uint8Array;
+}
+
+const pieceOf = (bytes: Uint8Array, deflate: Deflate): Piece => ({ bytes, deflated: deflate(bytes) });
+
+const lengthOf = (pieces: readonly Piece[]): number => pieces.reduce((sum, { deflated }) => sum + deflated.length, 0);
+
+/** A plane in one piece, or in two where each is better off with codes of its own. */
+function partsOf(bytes: Uint8Array, at: number, deflate: Deflate): Piece[] {
+  const whole = [pieceOf(bytes, deflate)];
+  if (at === 0 || at === bytes.length) return whole;
+  const parts = [bytes.subarray(0, at), bytes.subarray(at)].map((part) => pieceOf(part, deflate));
+  return lengthOf(parts) < lengthOf(whole) ? parts : whole;
+}
+
+/** Pieces one behind the other: those that are alike share their codes. */
+class Runs {
+  readonly #deflate: Deflate;
+  readonly #runs: Piece[] = [];
+
+  constructor(deflate: Deflate) {
+    this.#deflate = deflate;
+  }
+
+  add(piece: Piece): void {
+    const last = this.#runs.at(-1);
+    const both = last && pieceOf(concatenated([last.bytes, piece.bytes]), this.#deflate);
+    if (both && both.deflated.length < lengthOf([last, piece])) this.#runs[this.#runs.length - 1] = both;
+    else this.#runs.push(piece);
+  }
+
+  get pieces(): Uint8Array[] {
+    return this.#runs.map(({ deflated }) => deflated);
+  }
+}
+
+function concatenated(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
+  const all = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    all.set(piece, at);
+    at += piece.length;
+  }
+  return all;
+}
