@@ -9,7 +9,7 @@ import { integrityOf } from './integrity.mjs';
 
 const CDN = fileURLToPath(new URL('../cdn/', import.meta.url));
 /** Most that the element may weigh: bytes of gzip, readers of the other formats not counted. */
-export const BUDGET = 90_000;
+export const BUDGET = 92_000;
 
 /** Every script of the build: `{ file, raw, gzip }` with the path relative to cdn/ and bytes. */
 export function scriptSizes() {

@@ -409,16 +409,6 @@ export const ATTRIBUTES = {
 };
 
 type Table = typeof ATTRIBUTES;
-type Grammars = {
-  [
-    K in keyof Table as Table[K] extends { grammar?: AttributeGrammar<infer V> }
-      ? [V] extends [never]
-        ? never
-        : K
-      : never
-  ]: Table[K];
-};
-
 /** The properties of all attributes. */
 export type AttributeProperties = {
   -readonly [K in keyof Table]: Table[K] extends Attribute<infer P, unknown> ? P : never;
@@ -427,12 +417,12 @@ export type AttributeProperties = {
 /** An attribute's raw value: text, or what a property was given instead. */
 export type Raw = string | number | null | undefined;
 
-/** The properties read here, by their attributes' camel-case names. */
-export type RawAttributes = { readonly [K in keyof Grammars]: Raw };
+/** All properties, as the page has set them. */
+export type RawAttributes = { readonly [K in keyof Table]: unknown };
 
-/** All of them, read. */
+/** All of them, read: by their grammars, or as they were given. */
 export type Attributes = {
-  readonly [K in keyof Grammars]: Grammars[K] extends { grammar?: AttributeGrammar<infer V> } ? V : never;
+  readonly [K in keyof Table]: Table[K] extends Attribute<infer P, infer V> ? ([V] extends [never] ? P : V) : never;
 } & { readonly camera: CameraSettings };
 
 const entries = Object.entries(ATTRIBUTES) as [keyof Table, Attribute<unknown, unknown>][];
@@ -454,9 +444,10 @@ export const flags = entries.filter(([, { lit }]) => lit.type === Boolean).map((
 /** Reads all attributes; `warn` gets one sentence for each malformed one. */
 export function readAttributes(raw: RawAttributes, warn: (sentence: string) => void): Attributes {
   const values = Object.fromEntries(
-    entries.flatMap(([name, { grammar }]) =>
-      grammar ? [[name, readAttribute(attributeOf(name), raw[name as keyof Grammars], grammar, warn)]] : [],
-    ),
+    entries.map(([name, { grammar }]) => [
+      name,
+      grammar ? readAttribute(attributeOf(name), raw[name] as Raw, grammar, warn) : raw[name],
+    ]),
   ) as unknown as Omit<Attributes, 'camera'>;
   return {
     ...values,

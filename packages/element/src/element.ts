@@ -171,7 +171,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** True while the scene is shown. */
   get loaded(): boolean {
-    return this.stage.state === 'ready';
+    return this.stage.sources.state === 'ready';
   }
 
   /**
@@ -179,7 +179,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that is never scrolled to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.codeKnown).then(() => this.stage.settled);
+    return this.updateComplete.then(() => this.stage.settled).then(() => undefined);
   }
 
   /**
@@ -187,12 +187,12 @@ export class GaussianSplatElement extends ViewingMethods {
    * quarters, warming up is the rest.
    */
   get progress(): number {
-    return this.loaded ? 1 : (this.stage.progress ?? 0);
+    return this.loaded ? 1 : (this.stage.sources.progress ?? 0);
   }
 
   /** Why no scene is shown, or null. */
   get error(): ElementError | null {
-    return this.stage.error;
+    return this.stage.sources.error;
   }
 
   /** What the page may set of the models that are shown, from their contracts: for your own controls. Empty without a model; `inputs-change` tells of others. */
@@ -283,18 +283,18 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   protected override updated(changed: PropertyValues<this>): void {
-    this.stage.setSource(this);
     if (changed.size > 0) this.stage.requestFrame();
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.
-    if (bar) bar.style.transform = `scaleX(${this.stage.progress ?? 0})`;
+    if (bar) bar.style.transform = `scaleX(${this.stage.sources.progress ?? 0})`;
   }
 
   protected override render(): TemplateResult {
-    const { state, progress, hasPicture, reveal, behaviours, hotspots } = this.stage;
+    const { sources, reveal, behaviours, labels } = this.stage;
+    const { state, progress, hasPicture } = sources;
     // One of several scenes that fails leaves the others visible.
-    const error = hasPicture ? null : this.stage.error;
+    const error = hasPicture ? null : this.stage.sources.error;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
@@ -314,40 +314,19 @@ export class GaussianSplatElement extends ViewingMethods {
       onReset: this.stage.offersReset ? this.#onReset : null,
       strings: this.#strings,
       spoken: error ? this.#spokenError(error) : announcer.text,
-      hotspots: hotspots?.names ?? [],
+      hotspots: labels.value?.names ?? [],
     });
   }
 
   /** What the stage knows of an element. */
   static #hostOf(element: GaussianSplatElement): StageHost {
-    const part = <T extends HTMLElement>(selector: string): T | null =>
-      element.renderRoot?.querySelector<T>(selector) ?? null;
     return {
+      source: element,
       get attributes() {
         return element.#attributes;
       },
-      get input() {
-        const { cameraControls: enabled, disableZoom, disablePan, disableTap } = element;
-        const { touchAction, zoom: wheel } = element.#attributes;
-        return { enabled, zoom: !disableZoom, pan: !disablePan, tap: !disableTap, touchAction, wheel };
-      },
       get services() {
         return element.constructor as typeof GaussianSplatElement;
-      },
-      get loops() {
-        return element.loop;
-      },
-      get autoplays() {
-        return element.autoplay;
-      },
-      get startTime() {
-        return Number.isFinite(element.#startTime) ? element.#startTime : 0;
-      },
-      get autoRotates() {
-        return element.autoRotate;
-      },
-      get views() {
-        return element.views;
       },
       get strings() {
         return element.#strings;
@@ -355,15 +334,7 @@ export class GaussianSplatElement extends ViewingMethods {
       get liveValues() {
         return element.#liveValues;
       },
-      get canvas() {
-        return part<HTMLCanvasElement>('canvas');
-      },
-      get surface() {
-        return part('#view');
-      },
-      get hotspotLayer() {
-        return part('#hotspots');
-      },
+      part: <T extends HTMLElement>(selector: string) => element.renderRoot?.querySelector<T>(selector) ?? null,
       warn: (sentence) => element.#warn(sentence),
     };
   }
@@ -440,7 +411,7 @@ export class GaussianSplatElement extends ViewingMethods {
     const seconds = this.#startTime;
     if (Number.isFinite(seconds)) {
       // A scene that is still to come begins there anyway.
-      if (this.stage.playback.canPlay && !this.stage.isLeavingFor(this)) this.currentTime = seconds;
+      if (this.stage.playback.canPlay && !this.stage.sources.own.isLeaving) this.currentTime = seconds;
     } else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
   }
 
@@ -451,10 +422,10 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   #showStates(): void {
-    const { state, error } = this.stage;
+    const { state, error } = this.stage.sources;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
-      preview: this.stage.scene.isPreview,
+      preview: this.stage.sources.own.scene.isPreview,
       ready: state === 'ready',
       playing: !this.paused,
       error: error !== null,

@@ -29,12 +29,12 @@ export abstract class MediaProperties extends SplatProperties {
   /** Seconds into a scene that moves; setting it seeks. Set before there is one, or just after another `src`, it is where that one begins. */
   get currentTime(): number {
     const { playback } = this.stage;
-    return this.isUpdatePending && this.stage.isLeavingFor(this) ? playback.nextStart : playback.currentTime;
+    return this.isUpdatePending && this.stage.sources.own.isLeaving ? playback.nextStart : playback.currentTime;
   }
 
   set currentTime(seconds: number) {
     // Frameworks say so of a property that they do not set any more.
-    if (isSaid(seconds)) this.stage.seek(seconds, this);
+    if (isSaid(seconds)) this.stage.seek(seconds);
   }
 
   /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
@@ -68,7 +68,7 @@ export abstract class MediaProperties extends SplatProperties {
 
   /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is shown. */
   get readyState(): number {
-    return this.stage.state === 'ready' ? HAVE_ENOUGH_DATA : HAVE_NOTHING;
+    return this.stage.sources.state === 'ready' ? HAVE_ENOUGH_DATA : HAVE_NOTHING;
   }
 
   /** Times that can be sought: all of a scene with an end, none of others. */
@@ -83,7 +83,7 @@ export abstract class MediaProperties extends SplatProperties {
 
   /** Fetches the scene again, as if `src` had just been set: after an error, or when the file has changed. */
   load(): void {
-    this.stage.reload();
+    this.stage.sources.own.reload();
   }
 
   /**
@@ -106,6 +106,7 @@ export abstract class MediaProperties extends SplatProperties {
 
   /** Lets the time stand still. */
   pause(): void {
+    this.stage.sources.own.hasBegun = true;
     this.stage.playback.pause();
   }
 }

@@ -1,6 +1,5 @@
 import type { Attributes } from './attributes.js';
 import type { SpokenStrings } from './words.js';
-import type { InputOptions } from './controllers/input-controller.js';
 import type { SharedDevice } from './gpu/shared-device.js';
 import type { LiveState } from './live/live-model.js';
 import type { SceneLimits } from './loading/protocol.js';
@@ -30,21 +29,13 @@ export interface Source {
   readonly postprocess: string | null;
 }
 
-/** What the stage knows of its element, as of now: its attributes and the parts of its shadow tree, once they are rendered. */
+/** What the stage knows of its element, as of now: its attributes, and the parts of its shadow tree once they are rendered. */
 export interface StageHost {
   readonly attributes: Attributes;
-  readonly input: InputOptions;
   readonly services: Services;
-  readonly loops: boolean;
-  readonly autoplays: boolean;
-  /** The attribute `time`, in seconds; 0 without. */
-  readonly startTime: number;
-  readonly autoRotates: boolean;
-  readonly views: object | string | null;
+  readonly source: Source;
   readonly strings: SpokenStrings;
   readonly liveValues: Omit<LiveState, 'timeSeconds'>;
-  readonly canvas: HTMLCanvasElement | null;
-  readonly surface: HTMLElement | null;
-  readonly hotspotLayer: HTMLElement | null;
+  part<T extends HTMLElement>(selector: string): T | null;
   warn(sentence: string): void;
 }

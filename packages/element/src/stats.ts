@@ -58,6 +58,16 @@ export interface PartStats {
   readonly bytes: number;
 }
 
+/** What a scene takes. */
+export const costOf = (
+  scene: LoadedGaussians | null,
+): Pick<PartStats, 'splats' | 'triangles' | 'dropped' | 'bytes'> => ({
+  splats: scene ? (scene.gaussians.frameCount ?? scene.gaussians.count) : 0,
+  triangles: scene?.model?.triangles ?? 0,
+  dropped: scene?.gaussians.droppedCount ?? 0,
+  bytes: scene ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0) : 0,
+});
+
 /** Counts that have to be read back from the GPU. */
 export interface ReadCounts {
   readonly drawn: number;
@@ -77,12 +87,13 @@ export interface StatsContext {
   readonly frameBytes: number;
   /** Pixels by which pictures at rest may be off. */
   readonly pixels: number | undefined;
+  readonly parts: readonly PartStats[];
 }
 
 /** Puts together what is known without asking the GPU. */
 export function statsOf(
   scenes: readonly LoadedGaussians[],
-  { quality, dynamicQuality, counts, isPreview, frameBytes, pixels = 0 }: StatsContext,
+  { quality, dynamicQuality, counts, isPreview, frameBytes, pixels = 0, parts }: StatsContext,
 ): SceneStats {
   const sum = (of: (scene: LoadedGaussians) => number | undefined): number =>
     scenes.reduce((total, scene) => total + (of(scene) ?? 0), 0);
@@ -99,14 +110,17 @@ export function statsOf(
     drawn: counts?.drawn ?? null,
     contributed: counts?.contributed ?? null,
     bytes: {
-      scene: sum(({ gaussians }) => gaussians.byteLength) + sum(({ levels }) => levels?.byteLength),
+      scene:
+        sum(({ gaussians }) => gaussians.byteLength) +
+        sum(({ levels }) => levels?.byteLength) +
+        sum(({ model }) => model?.byteLength),
       frames: frameBytes,
     },
     quality,
     dynamicQuality,
     up: scenes[0]?.bounds.up ?? null,
     warnings: scenes.flatMap(({ warnings }) => warnings),
-    scenes: [],
+    scenes: parts,
     why: [
       ...whyPreview(isPreview),
       ...whyDropped(dropped),

@@ -30,7 +30,7 @@ export interface TemplateModel {
   readonly strings: SpokenStrings;
   /** What screen readers are told: of an error, else of the camera. */
   readonly spoken: string;
-  /** Slots of the hotspots. */
+  /** SourceList of the hotspots. */
   readonly hotspots: readonly string[];
 }
 

@@ -72,22 +72,22 @@ export abstract class ViewingMethods extends MediaProperties {
    * `argument/camera` for a view that is malformed or has no such name.
    */
   async flyTo(view: CameraView | string | number, options?: FlightOptions): Promise<boolean> {
-    return (await this.stage.tour()).flyTo(view, options);
+    return (await this.stage.tour.get()).flyTo(view, options);
   }
 
   /** Flies to the next view of the list, after the last to the first. As {@link flyTo}. */
   async nextView(options?: FlightOptions): Promise<boolean> {
-    return (await this.stage.tour()).step(1, options);
+    return (await this.stage.tour.get()).step(1, options);
   }
 
   /** Flies to the view before. As {@link flyTo}. */
   async previousView(options?: FlightOptions): Promise<boolean> {
-    return (await this.stage.tour()).step(-1, options);
+    return (await this.stage.tour.get()).step(-1, options);
   }
 
   /** Flies along all views of the list on one smooth path, or along the keyframes that its file has. As {@link flyTo}. */
   async flyAlong(options?: PathOptions): Promise<boolean> {
-    return (await this.stage.tour()).flyAlong(options);
+    return (await this.stage.tour.get()).flyAlong(options);
   }
 
   /**
@@ -95,7 +95,7 @@ export abstract class ViewingMethods extends MediaProperties {
    * @param share 0..1, from the first view to the last
    */
   async showAlong(share: number): Promise<void> {
-    return (await this.stage.tour()).showAlong(share);
+    return (await this.stage.tour.get()).showAlong(share);
   }
 
   /** Lets the interaction prompt come again, as if no visitor had touched the scene. */
@@ -111,7 +111,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** Box around nearly all of the scene, in metres of viewer space; null while none is shown. */
   getBoundingBox(): SceneBox | null {
-    return boxOf(this.stage);
+    return boxOf({ camera: this.stage.camera, bounds: this.stage.sources.bounds });
   }
 
   /**
@@ -126,7 +126,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** Where the hotspot of a slot is now, for example `hotspot-door`; null if there is none with a position. */
   queryHotspot(name: string): HotspotPlace | null {
-    return this.stage.hotspots?.query(name) ?? null;
+    return this.stage.labels.value?.query(name) ?? null;
   }
 
   /**

@@ -156,10 +156,6 @@ describe('several scenes in one element', () => {
     await at(-2, 1, 'put back');
     const other = await placeLoaded(`<gaussian-splat src="${GREEN}" ${VIEW}></gaussian-splat>`);
     other.append(child);
-    await until(
-      () => (other as unknown as { stage: { composing?: unknown } }).stage.composing !== undefined,
-      'its code',
-    );
     await comesToShow(other, isSeen);
     assertNear(await placeOf(other, isRed), [-2, 1], 'in another element');
     assertEqual(loads, 0, 'further loads');

@@ -1,4 +1,4 @@
-import type { Matrix4, Vector3 } from '@gaussian-splat/core';
+import type { Camera, Matrix4, Vector3 } from '@gaussian-splat/core';
 import { ReactiveElement, type PropertyDeclarations } from 'lit';
 import type { Box } from '@gaussian-splat/renderer';
 import { declarations, type Attribute, type Attributes } from '../attributes.js';
@@ -7,11 +7,13 @@ import { notPlayed } from '../controllers/playback-controller.js';
 import type { ElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import type { LiveState } from '../live/live-model.js';
+import { frameOf } from '../camera/settings.js';
 import type { Source } from '../stage-host.js';
 import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
-import type { Composition } from './composition.js';
-import type { Part } from './part.js';
-import { matrixOf, readMatrix } from './placing.js';
+import type { Member } from '../member.js';
+import { SourceEntry, type SourceOwner } from '../source-entry.js';
+import type { Stage } from '../stage.js';
+import { cameraInScene, isSolid, matrixOf, readMatrix, sceneToWorld } from './placing.js';
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
 
@@ -52,9 +54,11 @@ export type SettableOf<Table> = Partial<
 
 /** What all children have: a source, a place, and what is known of it. */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
-export abstract class SplatChild extends ReactiveElement {
+export abstract class SplatChild extends ReactiveElement implements SourceOwner {
   /** What stands for it among all that its `<gaussian-splat>` shows. @internal */
-  abstract readonly holder: Part;
+  readonly holder = new SourceEntry(this);
+  /** @internal */
+  readonly startTime = 0;
   /** @internal */
   protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
   readonly #warned = new Set<string>();
@@ -79,7 +83,7 @@ export abstract class SplatChild extends ReactiveElement {
 
   /** Fulfils, and never rejects, when there is nothing left to wait for: it is shown ({@link loaded}), it cannot be ({@link error}), or it has no source. */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.holder.settled);
+    return this.updateComplete.then(() => this.holder.scene.settled);
   }
 
   /** Why it is not shown, or null. */
@@ -170,12 +174,33 @@ export abstract class SplatChild extends ReactiveElement {
   }
 
   /** @internal */
-  get credentials(): Attributes['crossorigin'] {
-    return this.read('crossorigin', this.crossorigin);
+  get element(): this {
+    return this;
   }
 
   /** @internal */
-  get place(): ChildPlace {
+  get overrides(): Partial<Attributes> | undefined {
+    return this.crossorigin === null ? undefined : { crossorigin: this.read('crossorigin', this.crossorigin) };
+  }
+
+  /** @internal */
+  place({ scene, placement }: Member, { frame }: Stage): void {
+    const { placed, up, opacity, crop, hidden } = this.#placed;
+    placement.visible = !hidden && isSolid(placed);
+    if (placement.visible) placement.sceneToWorld = sceneToWorld(frame, placed, frameOf({ up }, scene.bounds));
+    placement.opacity = opacity;
+    placement.crop = crop;
+  }
+
+  /** @internal */
+  seenFrom(camera: Camera, member: Member | undefined, { frame }: Stage): Camera {
+    const { placed, up } = this.#placed;
+    // Where it will stand, before anything is known of it.
+    const matrix = member?.placement.sceneToWorld ?? sceneToWorld(frame, placed, frameOf({ up }, {}));
+    return isSolid(matrix) ? cameraInScene(camera, matrix) : camera;
+  }
+
+  get #placed(): ChildPlace {
     return (this.#place ??= this.readPlace());
   }
 
@@ -227,7 +252,7 @@ export abstract class SplatChild extends ReactiveElement {
   override disconnectedCallback(): void {
     super.disconnectedCallback();
     // With its element around it, it stays what it is, and goes when that does.
-    if (this.parentElement !== this.holder.owner) this.holder.attach(null);
+    if (this.parentElement !== this.holder.parent) this.holder.attach(null);
   }
 
   /** It shows nothing of its own. */
@@ -237,6 +262,7 @@ export abstract class SplatChild extends ReactiveElement {
 
   protected override updated(): void {
     this.holder.update();
+    this.holder.requestFrame();
   }
 }
 
@@ -266,11 +292,11 @@ export const childDeclarations = (
   playbackRate: { attribute: false, noAccessor: true },
 });
 
-/** The compositions of elements that have children. */
-export const compositions = new WeakMap<Element, Composition>();
+/** The stages of elements that have children. */
+export const stages = new WeakMap<Element, Stage>();
 
 /** Gives a child to its element. One that has not looked at its children yet asks for them itself. */
 export function adopt(child: SplatChild): void {
   const { parentElement } = child;
-  child.holder.attach((parentElement && compositions.get(parentElement)) ?? null);
+  child.holder.attach((parentElement && stages.get(parentElement)) ?? null);
 }

@@ -1,8 +1,6 @@
-/** Loaded when an element has its first child that is a scene or a mesh: what shows them beside its own scene. */
+/** Loaded when an element has its first child that is a scene or a mesh. */
 import type { Stage } from '../stage.js';
-import { adopt, compositions, SplatChild } from './child.js';
-import { ComposedStage } from './composed-stage.js';
-import { Composition } from './composition.js';
+import { adopt, SplatChild, stages } from './child.js';
 import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
 
@@ -15,8 +13,7 @@ export function define(): void {
 
 /** Lets an element show its children. */
 export function compose(stage: Stage): void {
-  compositions.set(stage.element, new Composition(stage));
-  Object.setPrototypeOf(stage, ComposedStage.prototype);
+  stages.set(stage.element, stage);
   define();
   for (const child of stage.element.children) if (child instanceof SplatChild) adopt(child);
 }

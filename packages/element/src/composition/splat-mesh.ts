@@ -4,15 +4,6 @@ import type { openGaussians } from '../gpu/open-scene.js';
 import type { Source } from '../stage-host.js';
 import { MESH_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import { childDeclarations, SplatChild } from './child.js';
-import { SceneSlot } from './scene-slot.js';
-
-/** The mesh of a `<splat-mesh>`: a source without splats. */
-class MeshSlot extends SceneSlot {
-  readonly open: typeof openGaussians = async (request, options) => {
-    const { openMesh } = await loadModule('the code that shows meshes', () => import('../meshes/open-mesh.js'));
-    return openMesh(request, options);
-  };
-}
 
 /**
  * A triangle mesh among scenes, as a child of `<gaussian-splat>`: glTF or GLB with its materials and animations. It hides splats behind it, and they hide it.
@@ -36,14 +27,18 @@ export class SplatMeshElement extends SplatChild {
   static override properties: PropertyDeclarations = childDeclarations(MESH_ATTRIBUTES);
 
   declare src: PropertiesOf<typeof MESH_ATTRIBUTES>['src'];
-  /** @internal */
-  readonly holder: SceneSlot = new MeshSlot(this);
   protected readonly table = MESH_ATTRIBUTES;
 
   /** @internal */
   get source(): Source {
     return { src: this.src, contract: null, chain: null, postprocess: null };
   }
+
+  /** A source without splats. @internal */
+  readonly open: typeof openGaussians = async (request, options) => {
+    const { openMesh } = await loadModule('the code that shows meshes', () => import('../meshes/open-mesh.js'));
+    return openMesh(request, options);
+  };
 }
 
 declare global {

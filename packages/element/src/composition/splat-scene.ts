@@ -5,7 +5,6 @@ import type { GeneratorInput } from '../live/inputs.js';
 import type { LiveState } from '../live/live-model.js';
 import { SCENE_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
-import { SceneSlot } from './scene-slot.js';
 
 type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
 
@@ -44,8 +43,6 @@ export class SplatSceneElement extends SplatChild {
 
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
   declare controls: ControlValues | null;
-  /** @internal */
-  readonly holder: SceneSlot = new SceneSlot(this);
   protected readonly table = SCENE_ATTRIBUTES;
   #liveValues: Omit<LiveState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;

@@ -20,7 +20,7 @@ export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'l
 
 /** What the models of an element, a generator and a post-processor, are told and whom they tell. */
 export class LiveWiring implements PostHost {
-  readonly post: PostController;
+  #post: PostController | undefined;
   readonly #host: LiveHost;
   #lastFault = '';
   /** How many inputs there were last. */
@@ -28,7 +28,10 @@ export class LiveWiring implements PostHost {
 
   constructor(host: LiveHost) {
     this.#host = host;
-    this.post = new PostController(this);
+  }
+
+  get post(): PostController {
+    return (this.#post ??= new PostController(this));
   }
 
   get postRequest(): PostHost['postRequest'] {

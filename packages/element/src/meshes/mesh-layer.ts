@@ -16,7 +16,7 @@ import {
 import type { ViewerFrame } from '../camera/orbit.js';
 import type { Frame } from '../live/frame-filter.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
-import type { MeshDrawing, PlacedModel } from '../composition/part.js';
+import type { PlacedModel } from './meshes.js';
 import type { Model } from './model.js';
 import { MeshResolve } from './mesh-resolve.js';
 
@@ -24,7 +24,7 @@ import { MeshResolve } from './mesh-resolve.js';
 const SAMPLES = 4;
 
 /** Draws meshes with three.js on the element's device, into the frame and a depth texture that splats end at. */
-export class MeshLayer implements MeshDrawing {
+export class MeshLayer {
   readonly device: GPUDevice;
   readonly #renderer: WebGPURenderer;
   readonly #scene = new Scene();

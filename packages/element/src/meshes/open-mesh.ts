@@ -7,8 +7,6 @@ import type { Timeline } from '../live/live-model.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import { Model } from './model.js';
 
-export { MeshLayer } from './mesh-layer.js';
-
 type Options = Pick<OpenOptions, 'loader' | 'signal' | 'frameUrl'>;
 
 /** Fetches and reads a glTF. Rejects with GaussianSplatError, or the signal's reason. */

@@ -32,7 +32,7 @@ export interface TourHost {
   readonly camera: CameraController;
   readonly behaviours: Behaviours;
   /** Fulfils, and never rejects, once nothing is left to wait for. */
-  readonly settled: Promise<void>;
+  readonly settled: Promise<unknown>;
   readonly surface: HTMLElement | null;
   readonly strings: SpokenStrings;
   readonly views: object | string | null;

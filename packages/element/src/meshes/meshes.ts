@@ -1,0 +1,90 @@
+/** Loaded when an element has meshes: three.js is behind this module. */
+import { multiply, type Matrix4 } from '@gaussian-splat/core';
+import type { FrameTarget, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import { credentialsOf } from '../attributes.js';
+import type { LoadedGaussians, MeshModel } from '../gpu/loaded-gaussians.js';
+import type { Frame } from '../live/frame-filter.js';
+import type { SourceEntry } from '../source-entry.js';
+import type { Stage } from '../stage.js';
+import { MeshLayer } from './mesh-layer.js';
+import { openModel } from './open-mesh.js';
+
+/** A mesh where it is drawn. */
+export interface PlacedModel {
+  readonly model: MeshModel;
+  readonly toWorld: Matrix4;
+}
+
+/** From a glTF's axes, y up, to those of the cloud that its splats are read as. */
+const GLTF_TO_CLOUD: Matrix4 = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+
+/** Meshes among the splats of an element. */
+export class Meshes {
+  readonly #stage: Stage;
+  /** What draws them, where there are some. */
+  #layer: MeshLayer | undefined;
+  #preparing = Promise.resolve();
+
+  constructor(stage: Stage) {
+    this.#stage = stage;
+  }
+
+  /** Meshes that are drawn, and where. */
+  get #models(): readonly PlacedModel[] {
+    return this.#stage.sources.members.flatMap(({ scene, placement }) => {
+      const { model, hasMeshes } = scene;
+      if (!model || !placement.visible) return [];
+      const { sceneToWorld = IDENTITY } = placement;
+      return [{ model, toWorld: hasMeshes ? multiply(sceneToWorld, GLTF_TO_CLOUD) : sceneToWorld }];
+    });
+  }
+
+  /** Changes whenever they do. */
+  get version(): string {
+    return this.#models.map(({ model }) => model.version).join();
+  }
+
+  /** Makes what draws on a device: once, whoever asks. */
+  prepare({ device }: LoadedGaussians): Promise<void> {
+    const prepare = async (): Promise<void> => {
+      if (this.#layer?.device === device) return;
+      this.#layer?.destroy();
+      this.#layer = undefined;
+      this.#layer = await MeshLayer.create(device);
+    };
+    const prepared = this.#preparing.then(prepare);
+    this.#preparing = prepared.catch(() => undefined);
+    return prepared;
+  }
+
+  /** Fetches those of a file that has splats, too. @returns false where the splats are gone meanwhile */
+  async add({ attributes, services, scene: { url } }: SourceEntry, scene: LoadedGaussians): Promise<boolean> {
+    const { signal } = new AbortController();
+    const request = { url, credentials: credentialsOf(attributes.crossorigin), limits: services.sceneLimits };
+    const frameUrl = (beside: string): string => services.urlModifier?.(beside) ?? beside;
+    const model = await openModel(request, { loader: services.sceneLoader, signal, frameUrl });
+    await this.prepare(scene);
+    if (scene.isDestroyed) model.dispose();
+    else scene.model = model;
+    return !scene.isDestroyed;
+  }
+
+  /** Draws them into a frame. @returns where splats are drawn over them */
+  draw(frame: Frame): Partial<FrameTarget> {
+    const models = this.#models;
+    return this.#layer && models.length > 0 ? this.#layer.draw(frame, models, this.#stage.frame) : {};
+  }
+
+  /** Ends what was found of splats where a mesh is nearer. */
+  async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
+    return this.#layer && this.#models.length > 0 ? this.#layer.probe(points, answers) : answers;
+  }
+
+  /** Frees what nothing needs any more. */
+  forget(): void {
+    if (this.#stage.sources.members.some(({ scene }) => scene.model)) return;
+    this.#layer?.destroy();
+    this.#layer = undefined;
+  }
+}

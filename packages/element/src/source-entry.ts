@@ -1,0 +1,359 @@
+import type { Camera } from '@gaussian-splat/core';
+import type { ReactiveControllerHost } from 'lit';
+import type { Attributes } from './attributes.js';
+import { DetailController, type DetailHost } from './controllers/detail-controller.js';
+import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
+import { SceneController, type Entrance, type SceneHost, type SceneState } from './controllers/scene-controller.js';
+import { SourceController, type SourceHost } from './controllers/source-controller.js';
+import type { ElementError } from './errors.js';
+import type { GaussianSplatEventMap } from './events.js';
+import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
+import type { GeneratorInput } from './live/inputs.js';
+import { LiveWiring, type LiveHost } from './live/live-wiring.js';
+import type { ProgressListener } from './loading/protocol.js';
+import type { Member } from './member.js';
+import type { Services, Source } from './stage-host.js';
+import type { Stage } from './stage.js';
+import { costOf, type PartStats } from './stats.js';
+
+/** What a entry needs once it belongs to nothing any more. */
+const NO_SERVICES = { releaseDelay: 0 } as Services;
+
+/** Whose source a entry shows: the element itself, or a child of it. */
+export interface SourceOwner {
+  readonly element: ReactiveControllerHost & HTMLElement;
+  readonly source: Source;
+  readonly liveValues: LiveHost['liveValues'];
+  readonly autoplay: boolean;
+  readonly loop: boolean;
+  /** Seconds at which it begins. */
+  readonly startTime: number;
+  /** False where it moves by the clock of the element around it. */
+  readonly hasOwnClock: boolean;
+  /** What it says otherwise than the element. */
+  readonly overrides?: Partial<Attributes>;
+  /** Opens what is no scene of splats. */
+  readonly open?: SceneHost['open'];
+  /** Puts it where it stands; absent where that is the world itself. */
+  place?(member: Member, stage: Stage): void;
+  /** A camera of the world, as it sees it. */
+  seenFrom?(camera: Camera, member: Member | undefined, stage: Stage): Camera;
+  warn(sentence: string): void;
+}
+
+/** The life of one source, be it the element's own or a child's: what is asked for, loaded and shown, its clock, its generator, its levels of detail. */
+export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHost, DetailHost {
+  readonly owner: SourceOwner;
+  readonly scene: SceneController;
+  readonly ownClock: PlaybackController;
+  readonly live: LiveWiring;
+  readonly #source: SourceController;
+  readonly #detail: DetailController;
+  /** Of the element that it belongs to, or belonged to last. */
+  #stage: Stage | undefined;
+  #isIn = false;
+  /** What it has in the world. */
+  member: Member | undefined;
+  /** Share of the loading that is done, 0..1; null while it is not known. */
+  progress: number | null = null;
+  /** It has played or was told not to: it begins by itself no more. */
+  hasBegun = false;
+  /** Bytes that have arrived, and how many there are. */
+  #bytes: [loaded: number, total: number | undefined] = [0, undefined];
+
+  constructor(owner: SourceOwner, stage?: Stage) {
+    this.owner = owner;
+    this.#stage = stage;
+    this.#isIn = stage !== undefined;
+    this.ownClock = new PlaybackController(this);
+    this.live = new LiveWiring(this);
+    this.scene = new SceneController(owner.element, this);
+    this.#source = new SourceController(this);
+    this.#detail = new DetailController(this);
+  }
+
+  // What the stage asks.
+
+  get state(): SceneState {
+    return this.scene.state;
+  }
+
+  get error(): ElementError | null {
+    return this.scene.error;
+  }
+
+  /** The clock that it follows. */
+  get playback(): PlaybackController {
+    return this.owner.hasOwnClock || !this.#stage ? this.ownClock : this.#stage.sources.own.ownClock;
+  }
+
+  /** Seconds that it moves for; NaN for what does not. */
+  get duration(): number {
+    return this.scene.scene?.live?.duration ?? NaN;
+  }
+
+  /** There is something of it to see. */
+  get isShown(): boolean {
+    return this.member !== undefined && (this.state === 'ready' || this.scene.isPreview);
+  }
+
+  get inputs(): readonly GeneratorInput[] {
+    return this.member?.scene.live?.inputs ?? [];
+  }
+
+  get stats(): PartStats {
+    const { state, error, scene } = this.scene;
+    return { element: this.owner.element, state, error, ...costOf(scene) };
+  }
+
+  /** It belongs to this element from now on, or to none, and comes with what it has loaded. */
+  attach(stage: Stage | null): void {
+    if (this.#isIn && stage === this.#stage) return this.update();
+    if (this.#isIn) this.#stage!.sources.remove(this);
+    this.#isIn = stage !== null;
+    if (stage === null) return;
+    this.#stage = stage;
+    stage.sources.add(this);
+    this.update();
+    const { scene } = this.scene;
+    if (scene && !scene.isLost) void this.show(scene, 'again').catch((error: unknown) => this.scene.fail(error));
+  }
+
+  /** The element that it belongs to; null for none. */
+  get parent(): Element | null {
+    return this.#isIn ? this.#stage!.element : null;
+  }
+
+  /** Its owner, or the element around it, may ask for something else now. */
+  update(): void {
+    if (!this.#isIn) return;
+    this.#source.set(this.owner.source);
+    this.#detail.update(this.state === 'ready' ? this.scene.scene : null);
+    this.autoplay();
+  }
+
+  /** It may be loaded, and play, now. */
+  request(): void {
+    if (!this.#isIn) return;
+    this.#source.request();
+    this.autoplay();
+  }
+
+  /** Loads it although nobody may see it, until another is wanted. */
+  needNow(): void {
+    this.#source.needNow(true);
+  }
+
+  reload(): void {
+    this.scene.want(null, false);
+    this.#source.renew();
+    this.owner.element.requestUpdate();
+  }
+
+  /** Its owner asks for something else than what is shown or loaded. */
+  get isLeaving(): boolean {
+    return this.#source.isOther(this.owner.source);
+  }
+
+  get postprocess(): readonly string[] {
+    return this.#source.postprocess;
+  }
+
+  /** Starts what plays by itself, where it may. */
+  autoplay(): void {
+    if (this.owner.autoplay && !this.hasBegun && this.ownClock.canPlay && this.#stage?.mayMove) this.ownClock.play();
+  }
+
+  /** Puts it where it stands, before a frame. */
+  place(): void {
+    // Asked for what it draws, a member brings other splats of its source into the world.
+    if (this.member?.placement && this.#isIn) this.owner.place?.(this.member, this.#stage!);
+  }
+
+  /** What moves goes on to the moment of a frame. The last frame of a scene whose place another will take stays as it is. */
+  advance(camera: Camera, now: number): void {
+    if (this.member && !this.scene.isOutgoing) this.live.advance(this.member.scene, this.#seenFrom(camera), now);
+  }
+
+  notePace(isWhole: boolean): void {
+    this.#detail.notePace(isWhole);
+  }
+
+  // What the controllers ask.
+
+  get element(): HTMLElement {
+    return this.owner.element;
+  }
+
+  get attributes(): Attributes {
+    const { attributes } = this.#stage!;
+    return this.owner.overrides ? { ...attributes, ...this.owner.overrides } : attributes;
+  }
+
+  get services(): Services {
+    return this.#stage?.services ?? NO_SERVICES;
+  }
+
+  get isInSight(): boolean {
+    return this.#stage!.isInSight;
+  }
+
+  get isConnected(): boolean {
+    return this.#isIn && this.#stage!.element.isConnected;
+  }
+
+  get wantsPreviews(): boolean {
+    return this.#stage!.isVisible;
+  }
+
+  get memoryBudget(): number | undefined {
+    return this.#stage!.memoryBudget;
+  }
+
+  get open(): SceneHost['open'] {
+    return this.owner.open;
+  }
+
+  get loops(): boolean {
+    return this.owner.hasOwnClock ? this.owner.loop : this.#stage!.loop;
+  }
+
+  get startTime(): number {
+    return this.owner.startTime;
+  }
+
+  get shown(): readonly LoadedGaussians[] {
+    return this.#isOwn ? this.#stage!.sources.shown : [];
+  }
+
+  get liveValues(): LiveHost['liveValues'] {
+    return this.owner.liveValues;
+  }
+
+  get liveRequest(): SceneHost['liveRequest'] {
+    const stage = this.#stage!;
+    return {
+      element: this.element,
+      runtimeLocation: this.services.runtimeLocation,
+      loader: this.services.sceneLoader,
+      state: () => this.live.state,
+      ownsControls: () => !stage.live.post.isWanted,
+      camera: (bounds) => {
+        if (bounds && this.#isOwn) stage.camera.frame(bounds);
+        return this.#seenFrom(stage.firstView);
+      },
+      listeners: this.live.listeners,
+    };
+  }
+
+  // What they tell.
+
+  requestFrame(): void {
+    this.#stage?.requestFrame();
+  }
+
+  splatsChanged(): void {
+    this.#stage?.splatsChanged();
+  }
+
+  warn(sentence: string): void {
+    this.owner.warn(sentence);
+  }
+
+  dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {
+    this.element.dispatchEvent(event);
+  }
+
+  playbackEvent(type: PlaybackEvent): void {
+    this.dispatch(new Event(type));
+    if (type !== 'play' && type !== 'pause') return;
+    this.hasBegun ||= type === 'play';
+    // Custom states and the button tell of them, too.
+    this.#stage?.element.requestUpdate();
+  }
+
+  async show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
+    if (!this.#isIn) return;
+    if (!this.#isOwn) this.ownClock.setDuration(this.duration);
+    await this.#stage!.sources.show(this, scene, entrance, (member) => {
+      this.leave();
+      this.member = member;
+      this.place();
+      this.live.tellInputs(this.#isOwn ? this.#stage!.inputs : this.inputs);
+    });
+  }
+
+  hide(clear: boolean): void {
+    this.leave();
+    this.ownClock.suspend();
+    if (clear) this.ownClock.empty();
+    if (this.#isIn) this.#stage!.sources.left(clear);
+  }
+
+  /** Out of the world: its splats are about to go, or to be shown elsewhere. */
+  leave(): void {
+    this.member?.remove();
+    this.member = undefined;
+  }
+
+  loadStarted(): void {
+    this.dispatch(new Event('loadstart'));
+  }
+
+  progressed(...[loaded, total, share = total ? loaded / total : undefined]: Parameters<ProgressListener>): void {
+    this.#bytes = [loaded, total];
+    this.progress = share === undefined ? null : Math.min(1, share);
+    this.#stage?.element.requestUpdate();
+    this.dispatch(new ProgressEvent('progress', { lengthComputable: total !== undefined, loaded, total: total ?? 0 }));
+  }
+
+  previewShown({ gaussians }: LoadedGaussians): void {
+    this.dispatch(new CustomEvent('preview', { detail: { splats: gaussians.count } }));
+    this.progressed(...this.#bytes);
+  }
+
+  loaded(url: string): void {
+    this.tellLoaded(url);
+    this.update();
+    this.#stage?.sources.settledOne();
+  }
+
+  tellLoaded(url: string): void {
+    for (const type of ['loadeddata', 'canplay'] as const) this.dispatch(new Event(type));
+    this.dispatch(new CustomEvent('load', { detail: { url } }));
+  }
+
+  tellFailed(error: ElementError): void {
+    this.dispatch(new CustomEvent('error', { detail: error }));
+  }
+
+  emptied(): void {
+    this.#source.needNow(false);
+    this.progress = null;
+    this.hasBegun = false;
+    this.ownClock.empty();
+    this.ownClock.stopWaits();
+    this.dispatch(new Event('emptied'));
+    // What else is there is back, if it is: its own loss is told of by the scene that comes.
+    if (!this.#isOwn) this.contextChanged('contextrestored');
+  }
+
+  failed(error: ElementError): void {
+    this.progress = null;
+    this.tellFailed(error);
+    if (!this.#isOwn) this.contextChanged('contextrestored');
+    this.#stage?.sources.settledOne();
+  }
+
+  contextChanged(type: 'contextlost' | 'contextrestored'): void {
+    this.#stage?.sources.contextChanged(type, this);
+  }
+
+  get #isOwn(): boolean {
+    return this.#stage?.sources.own === this;
+  }
+
+  #seenFrom(camera: Camera): Camera {
+    return this.owner.seenFrom?.(camera, this.member, this.#stage!) ?? camera;
+  }
+}
