@@ -1,4 +1,4 @@
-// The geometry of Gaussians in 16 bytes, relative to what their chunk is like: packages/renderer/src/detail/quantized-geometry.ts writes it. In place
+// The geometry of Gaussians in 16 bytes, relative to what their chunk is like: packages/renderer/src/streaming/quantized-geometry.ts writes it. In place
 // of shared/stored_gaussian for pages that are stored so.
 //
 // A chunk takes 258 rows. The first has the origin of its coordinates and the log2 of its least size (float32), the second the steps of both; then each splat has

@@ -10,23 +10,26 @@ import {
   type ShDegree,
 } from '@gaussian-splat/core';
 import {
-  buildDetailTree,
   checkManifest,
+  decodePage,
+  GaussianBuffers,
+  packGaussians,
+  Renderer,
+  StreamedGaussians,
+} from '@gaussian-splat/renderer';
+import { constants, pageLayout } from '@gaussian-splat/renderer/stages';
+import {
+  buildDetailTree,
   cloudOfChunks,
   codingOf,
   cutPages,
-  decodePage,
-  GaussianBuffers,
   manifestOf,
-  packGaussians,
   packPage,
   PageEncoder,
-  Renderer,
-  StreamedGaussians,
   USUAL_STEPS,
   type PageSteps,
-} from '@gaussian-splat/renderer';
-import { constants, HarmonicRounder, pageLayout } from '@gaussian-splat/renderer/stages';
+  HarmonicRounder,
+} from '@gaussian-splat/economise/pages';
 import { deflate } from '../../packages/cli/src/lib/encoders.mjs';
 import { detailFolder } from '../support/detail-folder.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';

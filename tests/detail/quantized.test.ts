@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
 import { boundsOf, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { buildDetailTree, GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
 import {
   constants,
   leafLevel,
@@ -13,6 +13,7 @@ import {
   QUANTIZED_CHUNK_WORDS,
   type SplatLevel,
 } from '@gaussian-splat/renderer/stages';
+import { buildDetailTree } from '@gaussian-splat/economise/pages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { detailFolder } from '../support/detail-folder.js';
 import { onlyInLab, someOf } from '../support/extent.js';

@@ -1,5 +1,6 @@
 /** A streamed scene whose folder lies in memory. */
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import type { DetailManifest } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
   codingOf,
@@ -9,11 +10,10 @@ import {
   packPage,
   treeOfCopies,
   type BuiltPage,
-  type DetailManifest,
   type DetailTree,
   type DetailTreeOptions,
   type PageSteps,
-} from '@gaussian-splat/renderer';
+} from '@gaussian-splat/economise/pages';
 
 export interface DetailFolder {
   readonly manifest: DetailManifest;

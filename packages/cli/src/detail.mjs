@@ -3,18 +3,17 @@ import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } f
 import { dirname, join, resolve } from 'node:path';
 import { shCoefficientCount } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
+import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
   codingOf,
   cutPages,
-  deviceDescriptor,
   manifestOf,
   PageEncoder,
   packPage,
-  startVariants,
   treeOfCopies,
   USUAL_STEPS,
-} from '@gaussian-splat/renderer';
+} from '@gaussian-splat/economise/pages';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { findSteps } from './lib/coded-pages.mjs';
 import { deflate } from './lib/encoders.mjs';

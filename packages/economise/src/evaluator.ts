@@ -1,5 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { SeenSplats } from '@gaussian-splat/renderer';
+import type { SeenSplats } from './pages/seen-splats.js';
 import type { Cut, ReducedCloud } from './reduce.js';
 import type { Ranking } from './score.js';
 

@@ -5,7 +5,7 @@ import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { turn } from './gpu/page-thread.js';
 import { MemoryLedger, type Reservation } from './memory-ledger.js';
-import { DETAIL_NUMBERS } from './detail/chunk-detail.js';
+import { DETAIL_NUMBERS } from './levels/chunk-detail.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
 import { shWords, type ShPrecision } from './pack/sh.js';

@@ -12,38 +12,16 @@ export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type PerFrameSettings, type RenderSettings, type Quality } from './render-settings.js';
 export { LinearColours } from './linear-colours.js';
-export { buildPackedLevels, packWithDetail, type PackedLevels } from './detail/packed-levels.js';
-export { packLevelRuns } from './detail/pack-runs.js';
-export { DetailedGaussians } from './detail/detailed-gaussians.js';
-export {
-  buildDetailTree,
-  cutPages,
-  manifestOf,
-  packPage,
-  type BuiltPage,
-  type DetailTree,
-  type DetailTreeOptions,
-} from './detail/build-pages.js';
-export { decodePage } from './detail/decode-page.js';
-export {
-  codingOf,
-  PageEncoder,
-  USUAL_STEPS,
-  type PageEncoderOptions,
-  type PageSteps,
-  type WrittenCoding,
-} from './detail/encode-page.js';
-export type { Deflate } from './detail/page-planes.js';
-export { cloudOfChunks, type PageChunks } from './detail/page-cloud.js';
-export type { CodedFile, PageCoding } from './detail/page-coding.js';
-export { roundedBy, SeenRounder } from './detail/round-harmonics.js';
-export { weighSplats, type SeenSplats } from './detail/seen-splats.js';
-export { treeOfCopies } from './detail/tile-tree.js';
-export { StreamedGaussians, type PoolOptions, type StreamOptions } from './detail/streamed-gaussians.js';
-export type { FetchPage, PageSource, StreamedScene } from './detail/page-source.js';
-export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './detail/level-pages.js';
-export { levelSource, packLevelPage } from './detail/level-source.js';
-export { checkManifest, type DetailManifest } from './detail/manifest.js';
+export { buildPackedLevels, packWithDetail, type PackedLevels } from './levels/packed-levels.js';
+export { packLevelRuns } from './streaming/pack-runs.js';
+export { DetailedGaussians } from './levels/detailed-gaussians.js';
+export { decodePage } from './streaming/decode-page.js';
+export type { CodedFile, PageCoding } from './streaming/page-coding.js';
+export { StreamedGaussians, type PoolOptions, type StreamOptions } from './streaming/streamed-gaussians.js';
+export type { FetchPage, PageSource, StreamedScene } from './streaming/page-source.js';
+export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
+export { levelSource, packLevelPage } from './streaming/level-source.js';
+export { checkManifest, type DetailManifest } from './streaming/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { ShPrecision } from './pack/sh.js';

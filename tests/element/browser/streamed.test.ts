@@ -1,5 +1,6 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { MemoryLedger, USUAL_STEPS } from '@gaussian-splat/renderer';
+import { MemoryLedger } from '@gaussian-splat/renderer';
+import { USUAL_STEPS } from '@gaussian-splat/economise/pages';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';

@@ -1,7 +1,8 @@
 /** How coarse the pages of a streamed scene may be: measured in pictures of them, attribute by attribute. */
 import { boundsOf } from '@gaussian-splat/core';
 import { allocateSteps, fitSteps, GpuEvaluator, viewsAround, viewsFromEverywhere } from '@gaussian-splat/economise';
-import { cloudOfChunks, codingOf, decodePage, manifestOf, PageEncoder, USUAL_STEPS } from '@gaussian-splat/renderer';
+import { decodePage } from '@gaussian-splat/renderer';
+import { cloudOfChunks, codingOf, manifestOf, PageEncoder, USUAL_STEPS } from '@gaussian-splat/economise/pages';
 import { deflateQuickly } from './encoders.mjs';
 
 /** Numbers of a splat that each step is that of; of harmonics half, for many are 0 anyway. */

@@ -1,6 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { Renderer, type SeenSplats } from '@gaussian-splat/renderer';
+import { Renderer } from '@gaussian-splat/renderer';
 import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
+import type { SeenSplats } from '../pages/seen-splats.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
 import { stayingInOrder } from '../order.js';

@@ -1,5 +1,5 @@
 import { shCoefficientCount } from '@gaussian-splat/core';
-import type { SeenSplats } from '@gaussian-splat/renderer';
+import type { SeenSplats } from '../pages/seen-splats.js';
 import { layouts } from './layouts.js';
 import { readBackWith } from './read-back.js';
 import type { SceneParts } from './scene-parts.js';

@@ -1,5 +1,5 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import type { SeenSplats } from '@gaussian-splat/renderer';
+import type { SeenSplats } from '../pages/seen-splats.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { inline, type TaskPool } from '../parts/task-pool.js';
 import { degreesOf, type Cut, type ReducedCloud } from '../reduce.js';

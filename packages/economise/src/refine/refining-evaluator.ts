@@ -1,5 +1,6 @@
 import { GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { Renderer, type SeenSplats } from '@gaussian-splat/renderer';
+import { Renderer } from '@gaussian-splat/renderer';
+import type { SeenSplats } from '../pages/seen-splats.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
 import { PictureErrors } from '../gpu/picture-errors.js';

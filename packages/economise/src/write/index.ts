@@ -1,6 +1,6 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import type { SeenSplats } from '@gaussian-splat/renderer';
 import { isOfPlanes } from '@gaussian-splat/renderer/stages';
+import type { SeenSplats } from '../pages/seen-splats.js';
 import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';

@@ -1,5 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { roundedBy, SeenRounder, weighSplats, type SeenSplats } from '@gaussian-splat/renderer';
+import { roundedBy, SeenRounder } from '../pages/round-harmonics.js';
+import { weighSplats, type SeenSplats } from '../pages/seen-splats.js';
 import type { Palette } from './palette.js';
 
 /** The code of 0 in the palette; codes nearer to it than {@link EVEN_CODES} are evenly spaced, and the largest is at most {@link MOST_BENT} steps. */

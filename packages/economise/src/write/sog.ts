@@ -1,5 +1,6 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import { packedOrder, type SeenSplats } from '@gaussian-splat/renderer';
+import { packedOrder } from '@gaussian-splat/renderer';
+import type { SeenSplats } from '../pages/seen-splats.js';
 import type { Steps } from '../allocate-steps.js';
 import { findPalette, type Palette } from './palette.js';
 import { addedBy, DIGITS, roundPalette, weightsOf } from './sog-palette.js';

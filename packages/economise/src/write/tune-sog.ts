@@ -1,5 +1,5 @@
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
-import type { SeenSplats } from '@gaussian-splat/renderer';
+import type { SeenSplats } from '../pages/seen-splats.js';
 import { allocateSteps, fitSteps, scaledSteps } from '../allocate-steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
 import type { Palette } from './palette.js';

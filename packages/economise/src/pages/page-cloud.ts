@@ -1,8 +1,13 @@
 import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
-import { constants } from '../generated/shaders.js';
-import { shReader } from '../pack/unpack.js';
-import { pageLayout, type DetailManifest } from './manifest.js';
-import { QUANTIZED_CHUNK_WORDS, readRow, ROW_CODES } from './quantized-geometry.js';
+import {
+  constants,
+  type DetailManifest,
+  pageLayout,
+  QUANTIZED_CHUNK_WORDS,
+  readRow,
+  ROW_CODES,
+  shReader,
+} from '@gaussian-splat/renderer/tools';
 
 const { CULL_GROUP, QUANTIZED_HEAD_ROWS, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO, QUANTIZED_OPAQUE } = constants;
 

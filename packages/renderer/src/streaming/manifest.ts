@@ -3,7 +3,7 @@ import { constants } from '../generated/shaders.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords, type ShPrecision } from '../pack/sh.js';
-import { DETAIL_NUMBERS } from './chunk-detail.js';
+import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { CLASSES, CLASS_STEP, LEAST_OPACITY_STEP, type PageCoding } from './page-coding.js';
 import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 

@@ -1,25 +1,31 @@
-import { constants } from '../generated/shaders.js';
-import { isOfPlanes } from '../pack/morton.js';
-import { SCALE_BIAS, SCALE_STEPS } from '../pack/sh.js';
-import type { BuiltPage, DetailTree } from './build-pages.js';
-import { ENDLESS, type ChunkErrors } from './chunk-detail.js';
 import {
   CHUNK_FLOATS,
+  type ChunkErrors,
   CLASS_STEP,
   CLASSES,
+  constants,
+  directionIn2,
+  directionIn3,
+  ENDLESS,
+  FACTOR_NUMBERS,
   FILE_FLOATS,
   interleaved,
+  isOfPlanes,
   LEAST_OPACITY_STEP,
   MIDDLE,
-  PLANES,
   type PageCoding,
-} from './page-coding.js';
+  PLANES,
+  rowLengths,
+  SCALE_BIAS,
+  SCALE_STEPS,
+  shNumbers,
+  type SplatLevel,
+} from '@gaussian-splat/renderer/tools';
+import type { BuiltPage, DetailTree } from './build-pages.js';
 import { headOf, joined, Planes, type Deflate } from './page-planes.js';
 import { differencesOf, HarmonicRounder } from './round-harmonics.js';
 import type { SeenSplats } from './seen-splats.js';
 import { numberOf, SplatWeights } from './splat-weights.js';
-import { directionIn2, directionIn3, rowLengths } from './quantized-geometry.js';
-import { FACTOR_NUMBERS, shNumbers, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP, ALPHA_MIN, QUANTIZED_OPAQUE, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO } = constants;
 const MOST_PLACES = 65_535;

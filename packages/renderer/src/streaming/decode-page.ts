@@ -3,7 +3,7 @@ import { constants } from '../generated/shaders.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { halfBits } from '../pack/half.js';
 import { BAND_SIZES, FIRST_CODE_BYTE, SCALE_BYTES, shWords } from '../pack/sh.js';
-import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
+import { DETAIL_NUMBERS, DETAIL_PLACES } from '../levels/chunk-detail.js';
 import { pageLayout, SLOT_CHUNKS } from './manifest.js';
 import {
   CHROMA_CODES,

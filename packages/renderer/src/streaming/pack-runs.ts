@@ -5,10 +5,10 @@ import { GEOMETRY_WORDS, packKept, usableIndices, type PackedGaussians, type Pac
 import { recentred } from '../pack/recentre.js';
 import { mortonOrder } from '../pack/morton.js';
 import { choosePrecision, noiseIn, shWords, type ShPrecision } from '../pack/sh.js';
-import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
-import { packFiller } from './pack-level.js';
+import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from '../levels/chunk-detail.js';
+import { packFiller } from '../levels/pack-level.js';
 import { errorsOfSpacings, spacingOf } from './run-errors.js';
-import { chunksOf } from './splat-level.js';
+import { chunksOf } from '../levels/splat-level.js';
 
 const { CULL_GROUP } = constants;
 

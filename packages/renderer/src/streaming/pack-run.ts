@@ -3,11 +3,11 @@ import { constants } from '../generated/shaders.js';
 import { boundChunks, CHUNK_NUMBERS } from '../pack/chunks.js';
 import { packGeometry } from '../pack/pack.js';
 import { packSh } from '../pack/sh.js';
-import { detailRows, DETAIL_NUMBERS } from './chunk-detail.js';
+import { detailRows, DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
-import { packFiller } from './pack-level.js';
+import { packFiller } from '../levels/pack-level.js';
 import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
-import { chunksOf, leafLevel, type SplatLevel } from './splat-level.js';
+import { chunksOf, leafLevel, type SplatLevel } from '../levels/splat-level.js';
 
 const { CULL_GROUP } = constants;
 

@@ -6,7 +6,7 @@ import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { BLOCK_BYTES, StagingBelt } from '../gpu/staging-belt.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { DETAIL_NUMBERS } from './chunk-detail.js';
+import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import type { PageList } from './page-list.js';
 import { QUANTIZED } from './quantized-reading.js';

@@ -1,17 +1,34 @@
 import { boundsOf, validateCloud, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
-import { constants } from '../generated/shaders.js';
-import { packedOrder } from '../pack/pack.js';
-import { recentred } from '../pack/recentre.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { choosePrecision, noiseIn, type ShPrecision } from '../pack/sh.js';
-import { levelsAbove } from './build-levels.js';
-import { boundLevel, detailRows, leafErrors, parentErrors, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
-import { pageLayout, type DetailManifest } from './manifest.js';
-import type { PageCoding } from './page-coding.js';
-import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
-import { CENTER_ROUNDING, packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
+import {
+  boundLevel,
+  CENTER_ROUNDING,
+  choosePrecision,
+  CHUNK_NUMBERS,
+  type ChunkErrors,
+  chunksOf,
+  constants,
+  DETAIL_NUMBERS,
+  type DetailManifest,
+  detailRows,
+  leafErrors,
+  leafLevel,
+  levelsAbove,
+  noiseIn,
+  packedOrder,
+  packFiller,
+  packLevelGeometry,
+  packLevelSh,
+  packQuantizedChunk,
+  type PageCoding,
+  pageLayout,
+  parentErrors,
+  QUANTIZED_CHUNK_WORDS,
+  recentred,
+  type ShPrecision,
+  type SplatLevel,
+  widenReach,
+} from '@gaussian-splat/renderer/tools';
 import { shellOrder } from './shell-order.js';
-import { chunksOf, leafLevel, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP } = constants;
 

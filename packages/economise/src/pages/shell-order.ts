@@ -1,5 +1,4 @@
-import { constants } from '../generated/shaders.js';
-import { isOfPlanes, sampleAxis } from '../pack/morton.js';
+import { constants, isOfPlanes, sampleAxis } from '@gaussian-splat/renderer/tools';
 
 const { CULL_GROUP } = constants;
 /** Splats within so many median distances from the median, along each axis, are one shell; every other shell reaches twice as far as the one before. */

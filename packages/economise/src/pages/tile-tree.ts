@@ -1,9 +1,14 @@
-import { constants } from '../generated/shaders.js';
+import {
+  type ChunkErrors,
+  constants,
+  emptyLevel,
+  FACTOR_NUMBERS,
+  levelsAbove,
+  shNumbers,
+  type SplatLevel,
+} from '@gaussian-splat/renderer/tools';
 import type { Bounds, Vector3 } from '@gaussian-splat/core';
-import { levelsAbove } from './build-levels.js';
 import { treeOf, type DetailTree } from './build-pages.js';
-import type { ChunkErrors } from './chunk-detail.js';
-import { emptyLevel, FACTOR_NUMBERS, shNumbers, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP } = constants;
 

@@ -1,4 +1,4 @@
-import { CHROMA_CODES } from './page-coding.js';
+import { CHROMA_CODES } from '@gaussian-splat/renderer/tools';
 import type { SeenSplats } from './seen-splats.js';
 
 /** Of a channel, in steps: what a signed byte holds. */

@@ -1,5 +1,4 @@
-import { DIFFERENCES, headBytes, PLAIN, PLANES, planesOf } from './page-coding.js';
-import type { SplatLevel } from './splat-level.js';
+import { DIFFERENCES, headBytes, PLAIN, PLANES, planesOf, type SplatLevel } from '@gaussian-splat/renderer/tools';
 
 /** What compresses bytes to a piece of a raw deflate stream that others are put behind: it ends with a sync flush. */
 export type Deflate = (bytes: Uint8Array) => Uint8Array;

@@ -7,7 +7,7 @@ import { joinSlots, packRun } from './pack-run.js';
 import { emptyList, putBelow, type PageList } from './page-list.js';
 import type { PageSource, StreamedScene } from './page-source.js';
 import { slotBySlot, type SlotWords } from './slot-words.js';
-import { chunksOf } from './splat-level.js';
+import { chunksOf } from '../levels/splat-level.js';
 
 /**
  * The words of a page.

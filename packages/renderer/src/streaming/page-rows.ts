@@ -1,6 +1,6 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
+import { DETAIL_NUMBERS, DETAIL_PLACES } from '../levels/chunk-detail.js';
 import { NONE } from './page-list.js';
 import { movePoints } from './slot-words.js';
 

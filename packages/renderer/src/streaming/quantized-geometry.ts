@@ -1,5 +1,5 @@
 import { constants, layouts } from '../generated/shaders.js';
-import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
+import { FACTOR_NUMBERS, type SplatLevel } from '../levels/splat-level.js';
 
 /**
  * Geometry of a chunk in half of the bytes: 16 a splat and 32 a chunk, as shaders/shared/quantized_gaussian.wgsl reads it. Centres are kept to 1/131,070 of the chunk's box, lengths of the

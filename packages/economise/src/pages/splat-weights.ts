@@ -1,6 +1,5 @@
-import { rowLengths } from './quantized-geometry.js';
+import { FACTOR_NUMBERS, rowLengths, type SplatLevel } from '@gaussian-splat/renderer/tools';
 import { weighSplats } from './seen-splats.js';
-import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
 
 /** The share of splats that weigh less than the one that the first class is of. */
 const REFERENCE_RANK = 0.9;

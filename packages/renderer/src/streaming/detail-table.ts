@@ -1,4 +1,4 @@
-import { DETAIL_NUMBERS } from './chunk-detail.js';
+import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { SLOT_CHUNKS } from './manifest.js';
 
 const SLOT_NUMBERS = DETAIL_NUMBERS * SLOT_CHUNKS;

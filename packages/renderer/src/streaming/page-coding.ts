@@ -1,6 +1,6 @@
 import type { ShDegree } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { shNumbers } from './splat-level.js';
+import { shNumbers } from '../levels/splat-level.js';
 
 /**
  * How the splats of coded pages are rounded, the same in all files of a folder. A file says the rest: how far apart coordinates are in each chunk, and where sizes begin.

@@ -1,0 +1,23 @@
+/** Writes the folders of LOD pages that the renderer streams: see docs/detail-pages.md. */
+export {
+  buildDetailTree,
+  cutPages,
+  manifestOf,
+  packPage,
+  type BuiltPage,
+  type DetailTree,
+  type DetailTreeOptions,
+} from './build-pages.js';
+export {
+  codingOf,
+  PageEncoder,
+  USUAL_STEPS,
+  type PageEncoderOptions,
+  type PageSteps,
+  type WrittenCoding,
+} from './encode-page.js';
+export { cloudOfChunks, type PageChunks } from './page-cloud.js';
+export type { Deflate } from './page-planes.js';
+export { HarmonicRounder } from './round-harmonics.js';
+export { weighSplats, type SeenSplats } from './seen-splats.js';
+export { treeOfCopies } from './tile-tree.js';
