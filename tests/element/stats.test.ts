@@ -13,7 +13,14 @@ const scene = {
 
 test('splats for which the device has no room are told of, after they were counted', () => {
   const pace = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];
-  const context = { quality: 'default', dynamicQuality: pace, isPreview: false, frameBytes: 0, pixels: 0 } as const;
+  const context = {
+    quality: 'default',
+    dynamicQuality: pace,
+    isPreview: false,
+    frameBytes: 0,
+    pixels: 0,
+    parts: [],
+  } as const;
   const whyOf = (left: number): string =>
     statsOf([scene], { ...context, counts: { drawn: 60, left, contributed: 9 } }).why.join();
   assert.equal(whyOf(0), '');
