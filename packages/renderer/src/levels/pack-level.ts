@@ -21,7 +21,7 @@ export function packLevelGeometry(
   }
 }
 
-/** What fills up the last chunk of a level: splats that nobody can see. */
+/** Fills up the last chunk of a level with invisible splats. */
 export function packFiller(words: Uint32Array, first: number, end: number): void {
   const factor = Float64Array.of(1e-6, 0, 1e-6, 0, 0, 1e-6);
   for (let i = first; i < end; i++) packShape(words, GEOMETRY_WORDS * i + 3, factor, 0);

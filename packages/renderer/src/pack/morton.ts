@@ -28,8 +28,8 @@ export function mortonOrder(positions: Float32Array, kept: Uint32Array, samples 
 }
 
 /**
- * True for splats of planes or layers: some of them share a coordinate, so that cameras that look along its axis find them at equal depths. Whoever puts them into another order changes such
- * pictures.
+ * Whether splats lie in planes or layers. Some of them share a coordinate, so a camera that looks along its axis finds them at equal depths,
+ * and another order changes the image.
  * @param positions [3 N] world units
  * @param kept indices of splats; default all
  */

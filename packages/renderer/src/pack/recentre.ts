@@ -7,7 +7,7 @@ const FAR = 16;
 
 /**
  * The cloud with its origin moved among its splats, in float64, if they lie far from it: a file may hold float32 coordinates of a million,
- * and a camera's matrix in float32 would then round the whole picture to their steps. Clouds near their origin are returned as they are.
+ * and a camera's matrix in float32 would then round the whole image to their steps. Clouds near their origin are returned as they are.
  */
 export function recentred(cloud: GaussianCloud): GaussianCloud {
   const columns = [0, 1, 2].map((axis) => sampleOf(cloud, axis));

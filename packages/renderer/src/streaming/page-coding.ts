@@ -53,7 +53,7 @@ export const CLASSES = 7;
 /** Between the scales of two classes. */
 export const CLASS_STEP = 8;
 
-/** Bytes of a decompressed file before its planes: the number of splats of each chunk, numbers, and how each plane is told. */
+/** Bytes of a decompressed file before its planes: the number of splats of each chunk, numbers, and how each plane is coded. */
 export const headBytes = ({ chunks, shDegree }: Pick<CodedFile, 'chunks' | 'shDegree'>): number =>
   chunks + 4 * (CHUNK_FLOATS * chunks + FILE_FLOATS) + planesOf(shDegree);
 
@@ -61,7 +61,7 @@ export const headBytes = ({ chunks, shDegree }: Pick<CodedFile, 'chunks' | 'shDe
 export const mostBytes = (file: Pick<CodedFile, 'chunks' | 'shDegree'>): number =>
   headBytes(file) + constants.CULL_GROUP * file.chunks * planesOf(file.shDegree);
 
-/** How a plane is told: by its bytes, or by what each adds to the one before. */
+/** How a plane is coded: by its bytes, or by what each adds to the one before. */
 export const PLAIN = 0;
 export const DIFFERENCES = 1;
 
