@@ -94,7 +94,7 @@ def test_unusable_gaussians_are_left_out_and_infinite_opacities_are_exact() -> N
     assert len(rows) == 8
     assert (rows[1, -1], rows[2, -1]) == (1, 0)
     with pytest.raises(ExportError, match=r"\[checkpoint/unreadable\]"):
-        export_classic(Cloud(*(part * np.float32(np.nan) for part in vars(given).values())), FACTS)
+        export_classic(replace(given, positions=given.positions * np.float32(np.nan)), FACTS)
 
 
 @pytest.mark.parametrize(("filter_", "antialiased"), [("classic", False), ("antialiased", True), ("mip", True)])

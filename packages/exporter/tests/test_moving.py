@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
 
 from gaussian_exporter.arrays import Doubles
 from gaussian_exporter.checkpoints.clouds import read_cloud
 from gaussian_exporter.checkpoints.hexplane_folder import read_hexplane
-from gaussian_exporter.checkpoints.moving import deform_of, gaussian4d_of, read_gaussian4d, read_spacetime
+from gaussian_exporter.checkpoints.moving import (
+    deform_of,
+    gaussian4d_of,
+    read_deformable,
+    read_gaussian4d,
+    read_spacetime,
+)
 from gaussian_exporter.checkpoints.torch_file import Weights
 from gaussian_exporter.cli import main
 from gaussian_exporter.errors import ExportError
+from gaussian_exporter.families.classic import export_classic
 from gaussian_exporter.families.deformable import Deform, export_deformable
 from gaussian_exporter.families.gaussian4d import Gaussian4D, export_gaussian4d
 from gaussian_exporter.families.spacetime import Spacetime, export_spacetime
@@ -24,10 +34,11 @@ from gaussian_exporter.placement import gpu_findings
 
 from .running import FACTS, UPPER, covariance, error, parts, run, write_ply
 from .test_classic import cloud
-from .test_hexplane import layers
+from .test_hexplane import layers, write_cloud
 
 TIMES = [0.0, 0.13, 0.5, 1.0]
 COUNT = 50
+ORACLES = Path(__file__).parents[3] / "tests/fixtures/oracles"
 
 
 def spacetime() -> Spacetime:
@@ -193,10 +204,36 @@ def reference_of_4d(model: Gaussian4D, time: float) -> dict[str, Doubles]:
 @pytest.mark.parametrize(("turned", "degree_t"), [(True, 2), (True, 0), (False, 1)])
 @pytest.mark.parametrize("time", TIMES)
 def test_gaussians_of_four_dimensions(time: float, turned: bool, degree_t: int) -> None:
-    model = gaussian4d_of(Path("x"), captured(turned, degree_t), {"time_duration": [0.0, 10.0]})
+    model = gaussian4d_of(Path("x"), captured(turned, degree_t), {"time_duration": [0.0, 10.0]}, "straight")
     found = parts(run(export_gaussian4d(model, FACTS), {"time": np.array([time])}))
     for name, values in reference_of_4d(model, time).items():
         assert error(found[name], values) < 1e-4, name
+
+
+def test_four_dimensions_as_the_trainers_own_class_cuts_them(tmp_path: Path) -> None:
+    """want.json: GaussianModel of fudan-zvg/4d-gaussian-splatting at 63725f2, which saved the checkpoint, too."""
+    folder = ORACLES / "4dgs"
+    out = tmp_path / "x.onnx"
+    given = ["4dgs", str(folder), str(out), "--license", "x", "--attribution", "x"]
+    assert main(given) == 1
+    assert main([*given, "--time-duration", "0", "10"]) == 0
+    for wanted in json.loads((folder / "want.json").read_text()):
+        found = parts(run(onnx.load(out), {"time": np.array([wanted["share_of_duration_0_to_10"]])}))
+        shown = np.array(wanted["shown"])
+        assert np.array_equal(found["opacities"][:, 0] > 0, shown)
+        assert error(found["opacities"][shown], np.array(wanted["opacities"]).reshape(-1, 1)[shown]) < 1e-5
+        for name, key in (("positions", "positions"), ("covariances", "covariances_xx_xy_xz_yy_yz_zz")):
+            assert error(found[name][shown], np.array(wanted[key])[shown]) < 1e-5, name
+
+
+def test_a_frame_ratio_shortens_the_time_as_the_trainer_does(tmp_path: Path) -> None:
+    shutil.copy(ORACLES / "4dgs/chkpnt30000.pth", tmp_path)
+    (tmp_path / "cfg_args").write_text("Namespace(frame_ratio=2, prefilter_var=-1.0)")
+    found = read_gaussian4d(tmp_path, duration=(0, 10))
+    assert (found.start, found.end) == (0, 5)
+    (tmp_path / "cfg_args").write_text("Namespace(wavelets=True, bells=False)")
+    with pytest.raises(ExportError, match=r"settings wavelets:"):
+        read_gaussian4d(tmp_path, duration=(0, 10))
 
 
 def test_all_of_them_stay_on_the_gpu_and_are_recorded() -> None:
@@ -267,6 +304,9 @@ def test_mip_splattings_filter_widens_and_fades(tmp_path: Path) -> None:
         1 + np.exp(-np.float64(given.opacity_logits[:, 0]))
     )
     assert error(1 / (1 + np.exp(-np.float64(found.opacity_logits[:, 0]))), shares) < 1e-5
+    # As the reader of pages has it, so that both draw one scene.
+    contract: Any = json.loads(export_classic(found, FACTS).metadata_props[0].value)
+    assert contract["filter"] == "mip" and contract["antialiased"] is True
 
 
 def test_a_4dgaussians_training_without_cfg_args_is_refused(tmp_path: Path) -> None:
@@ -309,7 +349,9 @@ def test_files_of_gsplat_and_nerfstudio(tmp_path: Path) -> None:
     state["_model.gauss_params.opacities"] = state["_model.gauss_params.opacities"][:, None]
     file = tmp_path / "run" / "nerfstudio_models" / "step-000029999.ckpt"
     file.parent.mkdir(parents=True)
-    torch.save({"step": 29999, "pipeline": state, "optimizers": {}, "scalers": {"scale": 1.0}}, file)
+    metrics = {"_model.lpips.net.weight": torch.zeros(3), "_model.camera_optimizer.pose_adjustment": torch.zeros(4, 6)}
+    extra = {"optimizers": {}, "scalers": {"scale": 1.0}}
+    torch.save({"step": 29999, "pipeline": {**state, **metrics}, **extra}, file)
     same_cloud(tmp_path / "run")
     assert main(["classic", str(file), str(tmp_path / "x.onnx"), "--license", "MIT", "--attribution", "A"]) == 0
     # Without harmonics, colours are a sigmoid: what the page then shows of 0.5 + c Y is the same.
@@ -317,12 +359,36 @@ def test_files_of_gsplat_and_nerfstudio(tmp_path: Path) -> None:
     torch.save({"pipeline": state}, file)
     shown: Any = 0.5 + 0.28209479177387814 * np.float64(read_cloud(file).sh[:, 0])
     assert error(shown, 1 / (1 + np.exp(-cloud(COUNT, 3).sh[:, 0].astype(np.float64)))) < 1e-6
+    for name in ("_model.gauss_params.appearance_features", "_model.color_nn.0.weight"):
+        torch.save({"pipeline": {**state, name: torch.zeros(COUNT, 3)}}, file)
+        with pytest.raises(ExportError, match=rf"tensors {name}:"):
+            read_cloud(file)
+        assert len(read_cloud(file, [name.removesuffix(".0.weight")]).positions) == COUNT
     torch.save({"splats": {**splats, "features": splats["means"]}}, file)
     with pytest.raises(ExportError, match=r"appearance optimisation"):
         read_cloud(file)
     torch.save({"state_dict": {}, "epoch": 3}, file)
     with pytest.raises(ExportError, match=r"a PyTorch file with state_dict, epoch"):
         read_cloud(file)
+
+
+def test_what_gsplat_saves_besides_is_refused_by_name(tmp_path: Path) -> None:
+    torch: Any = pytest.importorskip("torch")
+    splats = gsplat_splats(torch)
+    path = tmp_path / "ckpt_7_rank0.pt"
+    for name in ("post_processing", "app_module"):
+        torch.save({"step": 7, "splats": splats, name: {"weight": torch.zeros(3)}}, path)
+        with pytest.raises(ExportError, match=rf"entries {name}:"):
+            read_cloud(path)
+    torch.save({"step": 7, "splats": splats | {"velocities": splats["means"], "times": splats["opacities"]}}, path)
+    with pytest.raises(ExportError, match=r"velocities, times"):
+        read_cloud(path)
+    torch.save({"step": 7, "splats": splats, "pose_adjust": {"embeds.weight": torch.zeros(3, 9)}}, path)
+    same_cloud(path)
+    # gsplat's trainer of 2D Gaussians writes the same keys into a file without a rank.
+    with pytest.raises(ExportError, match=r"2D Gaussian Splatting"):
+        read_cloud(path.rename(tmp_path / "ckpt_7.pt"))
+    assert len(read_cloud(tmp_path / "ckpt_7.pt", ["2d"]).positions) == COUNT
 
 
 def test_captured_models(tmp_path: Path) -> None:
@@ -334,11 +400,20 @@ def test_captured_models(tmp_path: Path) -> None:
     path = tmp_path / "chkpnt30000.pth"
     torch.save(((3, *parameters, zeros, zeros, zeros, optimizer, 1.5), 30000), path)
     same_cloud(path)
+    (tmp_path / "cfg_args").write_text("Namespace(eval=True, kernel_size=0.1, ray_jitter=False)")
+    with pytest.raises(ExportError, match=r"Mip-Splatting. Give its point_cloud.ply"):
+        read_cloud(path)
+    (tmp_path / "cfg_args").write_text("Namespace(eval=True, sh_degree=3, deblur=True)")
+    with pytest.raises(ExportError, match=r"settings deblur:"):
+        read_cloud(path)
+    assert len(read_cloud(path, ["deblur"]).positions) == COUNT
+    (tmp_path / "cfg_args").unlink()
     entries = [torch.from_numpy(x) if isinstance(x, np.ndarray) else x for x in captured()]
     torch.save((tuple(entries), 30000), path)
     with pytest.raises(ExportError, match=r"4D Gaussian Splatting. Run gaussian-export 4dgs"):
         read_cloud(path)
-    with pytest.raises(ExportError, match=r"time_duration"):
+    (tmp_path / "cfg_args").write_text("Namespace(eval=True)")
+    with pytest.raises(ExportError, match=r"--time-duration"):
         read_gaussian4d(tmp_path)
     (tmp_path / "cfg_args").write_text("Namespace(time_duration=[0.0, 10.0], rot_4d=True, gaussian_dim=4)")
     found = read_gaussian4d(tmp_path)
@@ -360,6 +435,11 @@ def test_files_of_a_deform_network(tmp_path: Path) -> None:
     torch.save(state, path)
     from gaussian_exporter.checkpoints.torch_file import read_weights
 
+    torch.save(state | {"mask_net.weight": torch.zeros(2)}, path)
+    write_cloud(tmp_path / "point_cloud/iteration_40000/point_cloud.ply", cloud(COUNT, 3))
+    with pytest.raises(ExportError, match=r"tensors mask_net.weight:"):
+        read_deformable(tmp_path)
+    assert len(read_deformable(tmp_path, ["mask_net"])[0].positions) == COUNT
     again = deform_of(read_weights(path))
     at = {"time": np.array([0.3])}
     first, second = (run(export_deformable(cloud(COUNT, 3), one, FACTS), at) for one in (model, again))

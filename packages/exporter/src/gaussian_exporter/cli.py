@@ -27,7 +27,7 @@ from .families.avatar import PoseFormat, export_avatar
 from .families.classic import Colours, export_classic
 from .families.deformable import export_deformable
 from .families.feed_forward import export_feed_forward
-from .families.gaussian4d import export_gaussian4d
+from .families.gaussian4d import Rotation4D, export_gaussian4d
 from .families.hexplane import export_hexplane
 from .families.image_filter import export_image_filter
 from .families.scaffold import export_scaffold
@@ -87,6 +87,8 @@ def add_common(family: Command) -> None:
     facts.add_argument("--metres-per-unit", type=float)
     facts.add_argument("--duration", type=float, help="seconds that time 0 to 1 plays")
     facts.add_argument("--fps", type=float)
+    what = "tensors, properties and settings of the checkpoint that change nothing that is drawn, separated by commas"
+    facts.add_argument("--ignore", type=lambda text: text.split(","), default=[], metavar="NAMES", help=what)
     written = family.add_argument_group("output")
     written.add_argument(
         "--layout", choices=get_args(Layout), help="default: split; of classic packed, but for float16"
@@ -169,8 +171,6 @@ def report_findings(model: onnx.ModelProto) -> None:
 
 def _classic_options(family: Command) -> None:
     family.add_argument("--colours", choices=get_args(Colours), default="sh", help="view: harmonics in the graph")
-    what = "properties of vertices that change nothing, separated by commas"
-    family.add_argument("--ignore", type=lambda text: text.split(","), default=[], metavar="NAMES", help=what)
 
 
 def _scaffold_options(family: Command) -> None:
@@ -190,33 +190,45 @@ def _classic(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.
 
 
 def _scaffold(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_scaffold(read_scaffold(given.checkpoint, given.appearance), facts, options)
+    return export_scaffold(read_scaffold(given.checkpoint, given.appearance, given.ignore), facts, options)
 
 
 def _hexplane(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_hexplane(*read_hexplane(given.checkpoint), facts, options)
+    return export_hexplane(*read_hexplane(given.checkpoint, given.ignore), facts, options)
 
 
 def _spacetime(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_spacetime(read_spacetime(given.checkpoint), facts, options)
+    return export_spacetime(read_spacetime(given.checkpoint, given.ignore), facts, options)
 
 
 def _deformable(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_deformable(*read_deformable(given.checkpoint), facts, options)
+    return export_deformable(*read_deformable(given.checkpoint, given.ignore), facts, options)
+
+
+def _gaussian4d_options(family: Command) -> None:
+    what = "first and last second that play: time_duration of the configuration, which the trainer does not save"
+    family.add_argument("--time-duration", type=float, nargs=2, metavar=("START", "END"), help=what)
+    what = "straight: for what was trained by the code of before 2024-09-15; default reversed, as its code is now"
+    family.add_argument("--rotation", choices=get_args(Rotation4D), help=what)
 
 
 def _gaussian4d(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    model = read_gaussian4d(given.checkpoint)
+    if given.rotation is None:
+        print("4dgs: rotations as its code has them since 2024-09-15; --rotation straight is for older trainings")
+        given.rotation = "reversed"
+    model = read_gaussian4d(given.checkpoint, given.ignore, given.time_duration, given.rotation)
     # What is played is known: the seconds of the training.
     return export_gaussian4d(model, replace(facts, duration=facts.duration or model.end - model.start), options)
 
 
 def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_avatar(read_avatar(given.checkpoint), facts, options, cast(PoseFormat, given.pose))
+    return export_avatar(read_avatar(given.checkpoint, given.ignore), facts, options, cast(PoseFormat, given.pose))
 
 
 def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_feed_forward(replace(read_feed_forward(given.checkpoint), widened=given.widen), facts, options)
+    return export_feed_forward(
+        replace(read_feed_forward(given.checkpoint, given.ignore), widened=given.widen), facts, options
+    )
 
 
 def _feed_forward_options(family: Command) -> None:
@@ -243,7 +255,7 @@ def size(text: str) -> tuple[int, int]:
 
 def _image_filter(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
     refuse_instances(options, "image_filter")
-    model, config = read_image_filter(given.checkpoint)
+    model, config = read_image_filter(given.checkpoint, given.ignore)
     width, height = given.size or (int(config["width"]), int(config["height"]))
     return export_image_filter(model, width, height, facts)
 
@@ -258,7 +270,11 @@ FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
     "hexplane": (_no_options, "4DGS: the folder of 4DGaussians", _hexplane),
     "spacetime": (_no_options, "SpacetimeGaussians, lite: the trainer's folder, or its PLY file", _spacetime),
     "deformable": (_no_options, "Deformable-3D-Gaussians: the trainer's folder", _deformable),
-    "4dgs": (_no_options, "4D Gaussian Splatting (4D covariances): chkpnt*.pth, cfg_args beside it", _gaussian4d),
+    "4dgs": (
+        _gaussian4d_options,
+        "4D Gaussian Splatting (4D covariances): chkpnt*.pth, cfg_args beside it",
+        _gaussian4d,
+    ),
     "avatar": (_avatar_options, "a skinned avatar: one .npz file", _avatar),
     "feed-forward": (
         _feed_forward_options,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 
@@ -12,9 +13,10 @@ from ..arrays import AnyArray
 from ..errors import ExportError, listed
 from ..families.avatar import Avatar
 from .files import existing
+from .unread import refuse_unread
 
 
-def read_avatar(path: Path) -> Avatar:
+def read_avatar(path: Path, ignored: Sequence[str] = ()) -> Avatar:
     """Reads an avatar; numbers become float32."""
     if path.is_dir():
         raise _folder(path)
@@ -29,6 +31,7 @@ def read_avatar(path: Path) -> Avatar:
             found=f"arrays {listed(list(arrays))}",
             remedy="gaussian_exporter.families.avatar.Avatar says what each array holds",
         )
+    refuse_unread(path, "arrays", arrays, [field.name for field in known], ignored=ignored)
     given = {field.name: arrays[field.name] for field in known if field.name in arrays}
     lists = {"parents": [int(x) for x in given["parents"]], "joint_names": [str(x) for x in given["joint_names"]]}
     return Avatar(**{k: np.asarray(v, np.float32) for k, v in given.items() if k not in lists}, **lists)  # type: ignore[arg-type]

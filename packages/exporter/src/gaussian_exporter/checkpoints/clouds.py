@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,31 +13,64 @@ import numpy as np
 from ..arrays import AnyArray, Floats, sigmoid
 from ..errors import ExportError, listed
 from ..families.classic import Cloud, cloud_of_vertices, usable_degree
+from .cfg_args import find_cfg_args, read_cfg_args
 from .files import existing, latest_iteration
 from .kinds import other_family, refuse_neighbours, refuse_other_properties
 from .ply import read_ply
 from .torch_file import read_torch
+from .unread import refuse_settings, refuse_unread
 
 # Of harmonics of degree 0.
 _C0 = 0.28209479177387814
 _GSPLAT = ("means", "scales", "quats", "opacities", "sh0", "shN")
 _NERFSTUDIO = ("means", "scales", "quats", "opacities", "features_dc", "features_rest")
+# Beside the Gaussians: poses of training images, of which the Gaussians know nothing.
+_GSPLAT_KEYS = r"step|splats|pose_adjust(\..*)?"
+# Metrics, cameras and colors of training images: none of them is part of a rendered view.
+_NERFSTUDIO_KEYS = (
+    r"datamanager\..*|_model\.(device_indicator_param|(camera_optimizer|lpips|psnr|ssim|bil_grids)(\..*)?)"
+)
+# gsplat's trainer of 3D Gaussians writes the rank into the name of a file, that of 2D Gaussians does not.
+_GSPLAT_3D = re.compile(r".*_rank\d+\.pt")
+_OWN = "export the model as a module of your own: gaussian_exporter.export_module"
 # Entries of what INRIA's `capture` gives, the optimizer's state among them; fudan's 4DGS has more.
 _CAPTURED, _CAPTURED_4D = 12, 19
 
 
 def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
     """A PLY file in INRIA's layout; a checkpoint of gsplat (.pt), nerfstudio (.ckpt) or INRIA's trainer (chkpnt*.pth);
-    or the folder of a training with one of them in it. `ignored`: properties of vertices that change nothing."""
+    or the folder of a training with one of them in it. `ignored`: tensors, properties of vertices and settings that
+    change nothing; "2d" among them says that a gsplat checkpoint without a rank in its name is of 3D Gaussians."""
     path = newest_in(existing(path, "a PLY file, a checkpoint, or the folder of a training"))
     with path.open("rb") as file:
         is_archive = file.read(2) == b"PK"
+    refuse_neighbours(path)
+    kernel = refused_settings(path, ignored)
     if is_archive:
-        return cloud_of_checkpoint(path)
+        if kernel is not None:
+            remedy = "give its point_cloud.ply, which has the 3D filter of each Gaussian (filter_3D)"
+            raise other_family(path, "Mip-Splatting", "kernel_size in cfg_args, and no 3D filter", remedy)
+        return cloud_of_checkpoint(path, ignored)
     vertices = read_ply(path)
     refuse_other_properties(vertices.names, path, ignored)
-    refuse_neighbours(path)
-    return cloud_of_vertices(vertices)
+    cloud = cloud_of_vertices(vertices)
+    # A fused file of Mip-Splatting has its 3D filter in the scales, and only the settings name the other filter.
+    return cloud if kernel is None else replace(cloud, filter="mip")
+
+
+def refused_settings(path: Path, ignored: Sequence[str]) -> float | None:
+    """Mip-Splatting's kernel_size of the cfg_args around a file; raises for other settings that nobody knows."""
+    beside = find_cfg_args(path.parent)
+    settings = {} if beside is None else read_cfg_args(beside)
+    mip = (
+        "|kernel_size|ray_jitter|resample_gt_image|load_allres|sample_more_highres" if "kernel_size" in settings else ""
+    )
+    refuse_settings(beside or path, settings, ignored, f"(?!){mip}")
+    kernel = settings.get("kernel_size")
+    if kernel is not None and kernel != 0.1 and "kernel_size" not in ignored:
+        remedy = "train with kernel_size 0.1, or give --filter and --ignore kernel_size"
+        raise other_family(beside or path, "Mip-Splatting", f"kernel_size={kernel}", remedy)
+    return None if "kernel_size" in ignored else kernel  # type: ignore[return-value]
 
 
 def newest_in(path: Path) -> Path:
@@ -50,18 +84,25 @@ def newest_in(path: Path) -> Path:
     return latest_iteration(path) / "point_cloud.ply"
 
 
-def cloud_of_checkpoint(path: Path) -> Cloud:
+def cloud_of_checkpoint(path: Path, ignored: Sequence[str] = ()) -> Cloud:
     """Gaussians of a file of torch.save."""
     content: Any = read_torch(path)
     if isinstance(content, Mapping) and isinstance(content.get("splats"), Mapping):
-        return gsplat(path, content)
+        return gsplat(path, content, ignored)
     if isinstance(content, Mapping) and isinstance(content.get("pipeline"), Mapping):
-        return nerfstudio(path, content["pipeline"])
+        harmless = "step|pipeline|optimizers|schedulers|scalers"
+        refuse_unread(path, "entries", map(str, content), (), ignored=ignored, harmless=harmless)
+        return nerfstudio(path, content["pipeline"], ignored)
     captured = captured_of(content)
     if captured is not None and len(captured) == _CAPTURED_4D:
         raise other_family(path, "4D Gaussian Splatting", "Gaussians of space and time", "run gaussian-export 4dgs")
     if captured is not None and len(captured) == _CAPTURED:
         return inria(path, captured)
+    if captured is not None:
+        expected = f"{_CAPTURED} of INRIA's trainer, or {_CAPTURED_4D} of 4D Gaussian Splatting"
+        raise other_family(
+            path, "an unknown family", f"a captured model of {len(captured)} parts, not {expected}", _OWN
+        )
     raise unknown(path, content)
 
 
@@ -83,7 +124,7 @@ def unknown(path: Path, content: object) -> ExportError:
     )
 
 
-def gsplat(path: Path, content: Mapping[str, Any]) -> Cloud:
+def gsplat(path: Path, content: Mapping[str, Any], ignored: Sequence[str] = ()) -> Cloud:
     """gsplat's simple_trainer: {"splats": state_dict}, a file for each rank."""
     ranks = [path]
     match = re.fullmatch(r"(.*_rank)0(\.pt)", path.name)
@@ -93,16 +134,29 @@ def gsplat(path: Path, content: Mapping[str, Any]) -> Cloud:
     if "features" in files[0]:
         remedy = "train without app_opt: its colours come from a network that knows the training images"
         raise other_family(path, "gsplat with appearance optimisation", "features in place of harmonics", remedy)
+    refuse_unread(path, "entries", map(str, content), (), ignored=ignored, harmless=_GSPLAT_KEYS, family="gsplat")
+    for file in files:
+        refuse_unread(path, "tensors of splats", map(str, file), _GSPLAT, ignored=ignored, family="gsplat")
+    if not _GSPLAT_3D.fullmatch(path.name) and "2d" not in ignored:
+        remedy = (
+            "train a 3D model; if it is one, give --ignore 2d, or name the file ckpt_STEP_rank0.pt as its trainer does"
+        )
+        found = (
+            "no rank in the file's name, as gsplat's trainer of 2D Gaussians writes it (their third scale is untrained)"
+        )
+        raise other_family(path, "2D Gaussian Splatting", found, remedy)
     parts = {name: np.concatenate([table(path, file, name) for file in files]) for name in _GSPLAT}
     sh = np.concatenate([parts["sh0"], parts["shN"]], 1)
     return Cloud(parts["means"], parts["scales"], parts["quats"], parts["opacities"].reshape(-1, 1), degrees(path, sh))
 
 
-def nerfstudio(path: Path, pipeline: Mapping[str, Any]) -> Cloud:
+def nerfstudio(path: Path, pipeline: Mapping[str, Any], ignored: Sequence[str] = ()) -> Cloud:
     """nerfstudio's splatfacto: the state of its pipeline. Without harmonics its colours go through a sigmoid."""
     prefix = next((p for p in ("_model.gauss_params.", "_model.") if f"{p}means" in pipeline), None)
     if prefix is None:
         raise unknown(path, pipeline)
+    read = [prefix + name for name in _NERFSTUDIO]
+    refuse_unread(path, "tensors", pipeline, read, ignored=ignored, harmless=_NERFSTUDIO_KEYS, family="nerfstudio")
     own = {name: table(path, pipeline, prefix + name) for name in _NERFSTUDIO}
     dc = own["features_dc"].reshape(-1, 1, 3)
     if own["features_rest"].shape[1] == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..arrays import Floats
@@ -11,7 +12,7 @@ from ..families.hexplane import PLANES, Deformation
 from ..pieces.mlp import Linear
 from .cfg_args import require_cfg_args
 from .files import existing, latest_iteration
-from .kinds import refuse_other_properties
+from .kinds import refuse_other_properties, unfiltered
 from .ply import read_ply
 from .torch_file import Weights, read_weights
 
@@ -24,7 +25,17 @@ _REFUSED = {
 }
 
 
-def read_hexplane(folder: Path) -> tuple[Cloud, Deformation]:
+# Heads of the network, and the settings that turn them off.
+_SWITCHES = {
+    "pos_deform": "no_dx",
+    "scales_deform": "no_ds",
+    "rotations_deform": "no_dr",
+    "opacity_deform": "no_do",
+    "shs_deform": "no_dshs",
+}
+
+
+def read_hexplane(folder: Path, ignored: Sequence[str] = ()) -> tuple[Cloud, Deformation]:
     """Reads the latest iteration."""
     point_cloud = latest_iteration(existing(folder, "the folder of a 4DGaussians training"))
     why = "it says which heads of the network are used (no_do, no_dshs), which no file of weights tells"
@@ -36,27 +47,31 @@ def read_hexplane(folder: Path) -> tuple[Cloud, Deformation]:
         raise _unsupported(folder, "a model with encoded plane features (grid_pe)")
     weights = read_weights(point_cloud / "deformation.pth")
     vertices = read_ply(point_cloud / "point_cloud.ply")
-    refuse_other_properties(vertices.names, vertices.path)
-    cloud = cloud_of_vertices(vertices)
-    return cloud, deformation_of(weights.under("deformation_net"), settings)
+    refuse_other_properties(vertices.names, vertices.path, ignored)
+    cloud = unfiltered(cloud_of_vertices(vertices), vertices.path)
+    deformation = deformation_of(weights.under("deformation_net"), settings)
+    off = "|".join(head for head, switch in _SWITCHES.items() if settings[switch])
+    # Networks of the trainer's first versions, which its forward pass does not call.
+    weights.refuse_unread(ignored, rf"timenet\..*|.*_poc|deformation_net\.({off}|static_mlp)\..*")
+    return cloud, deformation
 
 
 def deformation_of(weights: Weights, settings: dict[str, object]) -> Deformation:
     """The network deformation_net of a state_dict; settings hold the trainer's no_dx, no_ds, no_dr, no_do, no_dshs."""
 
-    def head(name: str, switch: str | None) -> list[Linear]:
-        return [] if switch and settings[switch] else weights.under(name).linears()
+    def head(name: str) -> list[Linear] | None:
+        return None if settings[_SWITCHES[name]] else weights.under(name).linears()
 
     return Deformation(
         box=weights.get("grid.aabb"),
         resolutions=read_planes(weights.under("grid.grids")),
         trunk=weights.under("feature_out").linears(),
-        position=head("pos_deform", "no_dx") or None,
-        scale=head("scales_deform", "no_ds") or None,
-        rotation=head("rotations_deform", "no_dr") or None,
-        opacity=head("opacity_deform", "no_do") or None,
-        sh=head("shs_deform", "no_dshs") or None,
-        mask=head("static_mlp", None) if settings.get("static_mlp") else None,
+        position=head("pos_deform"),
+        scale=head("scales_deform"),
+        rotation=head("rotations_deform"),
+        opacity=head("opacity_deform"),
+        sh=head("shs_deform"),
+        mask=weights.under("static_mlp").linears() if settings.get("static_mlp") else None,
     )
 
 

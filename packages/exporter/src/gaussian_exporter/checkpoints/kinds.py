@@ -3,14 +3,15 @@ passed over."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..errors import ExportError, listed
+from ..errors import ExportError
+from ..families.classic import Cloud
+from .unread import refuse_unread
 
 # Properties of vertices that INRIA's layout has, or that say nothing about Gaussians.
-_PLAIN = re.compile(r"x|y|z|nx|ny|nz|f_dc_[0-2]|f_rest_\d+|opacity|scale_[0-2]|rot_[0-3]|filter_3D|red|green|blue")
+_PLAIN = r"x|y|z|nx|ny|nz|f_dc_[0-2]|f_rest_\d+|opacity|scale_[0-2]|rot_[0-3]|filter_3D|red|green|blue"
 # A property that only one family writes: its name, and what to do.
 _BY_PROPERTY = {
     "f_t_0": (
@@ -45,10 +46,14 @@ def refuse_other_properties(names: Sequence[str], where: Path, ignored: Sequence
     if "scale_0" in names and "scale_2" not in names:
         remedy = "discs without a thickness are another rasterizer's; train with a 3D model"
         raise other_family(where, "2D Gaussian Splatting", "two scales a Gaussian", remedy)
-    unknown = [name for name in names if not _PLAIN.fullmatch(name) and name not in ignored]
-    if unknown:
-        remedy = f"if it changes nothing: --ignore {','.join(unknown)}; if it does, it needs an exporter of its own"
-        raise other_family(where, "an unknown family", f"properties {listed(unknown)}", remedy)
+    refuse_unread(where, "properties", names, (), ignored=ignored, harmless=_PLAIN)
+
+
+def unfiltered(cloud: Cloud, where: Path) -> Cloud:
+    """The cloud, refused if it has Mip-Splatting's 3D filter: a network that changes scales expects them without."""
+    if cloud.filter is not None:
+        raise other_family(where, "an unknown family", "the property filter_3D beside a network", "train without it")
+    return cloud
 
 
 def refuse_neighbours(point_cloud: Path) -> None:

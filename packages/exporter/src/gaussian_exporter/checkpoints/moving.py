@@ -13,18 +13,19 @@ from ..arrays import Floats
 from ..errors import ExportError
 from ..families.classic import Cloud, cloud_of_vertices
 from ..families.deformable import Deform
-from ..families.gaussian4d import Gaussian4D
+from ..families.gaussian4d import Gaussian4D, Rotation4D
 from ..families.spacetime import Spacetime
 from ..pieces.mlp import Linear
 from .cfg_args import require_cfg_args
 from .clouds import captured_of, unknown
 from .files import existing, latest_iteration
-from .kinds import other_family, refuse_other_properties
+from .kinds import other_family, refuse_other_properties, unfiltered
 from .ply import Vertices, read_ply
 from .torch_file import Weights, read_torch, read_weights
+from .unread import refuse_settings
 
 
-def read_spacetime(path: Path) -> Spacetime:
+def read_spacetime(path: Path, ignored: Sequence[str] = ()) -> Spacetime:
     """The folder of a training of SpacetimeGaussians, or the PLY file of its lite model."""
     existing(path, "the folder of a SpacetimeGaussians training, or its point_cloud.ply")
     vertices = read_ply(latest_iteration(path) / "point_cloud.ply" if path.is_dir() else path)
@@ -35,7 +36,7 @@ def read_spacetime(path: Path) -> Spacetime:
     def numbered(prefix: str, count: int) -> Floats:
         return vertices.columns(*(f"{prefix}_{i}" for i in range(count)))
 
-    return Spacetime(
+    model = Spacetime(
         positions=vertices.columns("x", "y", "z"),
         centres=vertices.columns("trbf_center"),
         widths=vertices.columns("trbf_scale"),
@@ -46,16 +47,21 @@ def read_spacetime(path: Path) -> Spacetime:
         opacity_logits=vertices.columns("opacity"),
         colours=numbered("f_dc", 3),
     )
+    vertices.refuse_unread(ignored)
+    return model
 
 
-def read_deformable(folder: Path) -> tuple[Cloud, Deform]:
+def read_deformable(folder: Path, ignored: Sequence[str] = ()) -> tuple[Cloud, Deform]:
     """The folder of a training of Deformable-3D-Gaussians: point_cloud/ and deform/ of the same iteration."""
     existing(folder, "the folder of a Deformable-3D-Gaussians training")
     point_cloud = latest_iteration(folder)
     network = folder / "deform" / point_cloud.name / "deform.pth"
     vertices: Vertices = read_ply(point_cloud / "point_cloud.ply")
-    refuse_other_properties(vertices.names, vertices.path)
-    return cloud_of_vertices(vertices), deform_of(read_weights(existing(network, "the network of that iteration")))
+    refuse_other_properties(vertices.names, vertices.path, ignored)
+    weights = read_weights(existing(network, "the network of that iteration"))
+    deform = deform_of(weights)
+    weights.refuse_unread(ignored)
+    return unfiltered(cloud_of_vertices(vertices), vertices.path), deform
 
 
 def deform_of(weights: Weights) -> Deform:
@@ -83,8 +89,14 @@ def deform_of(weights: Weights) -> Deform:
     )
 
 
-def read_gaussian4d(path: Path) -> Gaussian4D:
-    """chkpnt*.pth of 4D Gaussian Splatting, or the folder with one; cfg_args beside it says which seconds play."""
+def read_gaussian4d(
+    path: Path,
+    ignored: Sequence[str] = (),
+    duration: Sequence[float] | None = None,
+    rotation: Rotation4D = "reversed",
+) -> Gaussian4D:
+    """chkpnt*.pth of 4D Gaussian Splatting, or the folder with one, cfg_args beside it. `duration`: first and last
+    second, time_duration of the configuration that it was trained with; `rotation`: see Gaussian4D."""
     existing(path, "the folder of a 4D Gaussian Splatting training, or its chkpnt*.pth")
     if path.is_dir():
         found = [(int(m[1]), p) for p in path.glob("chkpnt*.pth") if (m := re.fullmatch(r"chkpnt(\d+)\.pth", p.name))]
@@ -94,23 +106,42 @@ def read_gaussian4d(path: Path) -> Gaussian4D:
     captured = captured_of(content)
     if captured is None or len(captured) != 19:
         raise unknown(path, content)
-    settings = require_cfg_args(path.parent, "it says which seconds are played (time_duration)")
-    return gaussian4d_of(path, captured, settings)
+    settings = require_cfg_args(
+        path.parent, "it says how the time was scaled and filtered (frame_ratio, prefilter_var)"
+    )
+    harmless = (
+        "loaded_pth|extension|frame_ratio|num_extra_pts|num_pts|num_pts_ratio|prefilter_var|dataloader|time_duration"
+    )
+    harmless += "|rot_4d|gaussian_dim|force_sh_3d|batch_size|exhaust_test|config|seed"
+    refuse_settings(path.parent / "cfg_args", settings, ignored, harmless)
+    played = _seconds(path, settings, duration)
+    return gaussian4d_of(path, captured, {**settings, "time_duration": played}, rotation)
 
 
-def gaussian4d_of(path: Path, captured: Sequence[Any], settings: dict[str, object]) -> Gaussian4D:
-    """What `GaussianModel.capture` gave of Gaussians of four dimensions."""
-    degree, positions, dc, rest, log_scales, rotations, opacity_logits = captured[:7]
-    times, log_scales_t, rotations_r, is_turned, environment, degree_t = captured[13:]
-    duration = settings.get("time_duration")
-    if not isinstance(duration, (list, tuple)) or len(duration) != 2:
+def _seconds(path: Path, settings: dict[str, object], given: Sequence[float] | None) -> list[float]:
+    """First and last second that are played. The trainer divides those of its configuration by the frame ratio, and
+    writes neither into cfg_args."""
+    duration = settings.get("time_duration") if given is None else given
+    if not isinstance(duration, (list, tuple)) or len(duration) != 2 or not float(duration[0]) < float(duration[1]):
         raise ExportError(
             "checkpoint/incomplete",
-            where=f"cfg_args beside {path}",
-            expected="time_duration=[start, end]",
+            where=str(path),
+            expected="the first and the last second (time_duration), which the trainer does not save",
             found=repr(duration),
-            remedy="copy it from the configuration (configs/*.yaml) into cfg_args",
+            remedy="give --time-duration START END, as in the configuration (configs/*.yaml)",
         )
+    ratio = settings.get("frame_ratio", 1)
+    divisor = float(ratio) if isinstance(ratio, (int, float)) and ratio > 1 else 1.0
+    return [float(second) / divisor for second in duration]
+
+
+def gaussian4d_of(
+    path: Path, captured: Sequence[Any], settings: dict[str, Any], rotation: Rotation4D = "reversed"
+) -> Gaussian4D:
+    """What `GaussianModel.capture` gave of Gaussians of four dimensions; settings: time_duration and prefilter_var."""
+    degree, positions, dc, rest, log_scales, rotations, opacity_logits = captured[:7]
+    times, log_scales_t, rotations_r, is_turned, environment, degree_t = captured[13:]
+    duration = settings["time_duration"]
     if getattr(environment, "size", 0):
         raise other_family(path, "4D Gaussian Splatting", "an environment map behind its Gaussians", "train without")
     terms = (int(degree) + 1) ** 2
@@ -133,4 +164,5 @@ def gaussian4d_of(path: Path, captured: Sequence[Any], settings: dict[str, objec
         start=float(duration[0]),
         end=float(duration[1]),
         filter=max(0.0, float(variance)) if isinstance(variance, (int, float)) else 0.0,
+        rotation=rotation,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,7 +16,7 @@ from .files import existing
 from .torch_file import Weights, read_weights
 
 
-def read_feed_forward(folder: Path) -> FeedForward:
+def read_feed_forward(folder: Path, ignored: Sequence[str] = ()) -> FeedForward:
     """config.json: width, height, views, near, far, depths; layers encoder.i, depth.i and head.i."""
     config, weights = read_network(folder, "feed-forward", ("width", "height", "views", "near", "far", "depths"))
 
@@ -23,7 +24,7 @@ def read_feed_forward(folder: Path) -> FeedForward:
         # Without any, the first is asked for: its absence is the error.
         return [convolution(weights.under(f"{name}.{index}")) for index in numbers(weights, name) or [0]]
 
-    return FeedForward(
+    model = FeedForward(
         width=int(config["width"]),
         height=int(config["height"]),
         views=int(config["views"]),
@@ -34,13 +35,15 @@ def read_feed_forward(folder: Path) -> FeedForward:
         depth=stack("depth"),
         head=stack("head"),
     )
+    weights.refuse_unread(ignored)
+    return model
 
 
-def read_image_filter(folder: Path) -> tuple[ImageFilter, dict[str, Any]]:
+def read_image_filter(folder: Path, ignored: Sequence[str] = ()) -> tuple[ImageFilter, dict[str, Any]]:
     """config.json: output, width, height; layers stem, down.i, blocks.i.0-1, up.i, out. Returns the config, too."""
     config, weights = read_network(folder, "image filter", ("output", "width", "height"))
 
-    return ImageFilter(
+    model = ImageFilter(
         stem=convolution(weights.under("stem")),
         down=[convolution(weights.under(f"down.{i}")) for i in numbers(weights, "down")],
         blocks=[
@@ -50,7 +53,9 @@ def read_image_filter(folder: Path) -> tuple[ImageFilter, dict[str, Any]]:
         up=[convolution(weights.under(f"up.{i}")) for i in numbers(weights, "up")],
         out=convolution(weights.under("out")),
         output=cast(Output, config["output"]),
-    ), config
+    )
+    weights.refuse_unread(ignored)
+    return model, config
 
 
 def numbers(weights: Weights, name: str) -> list[int]:

@@ -1,5 +1,6 @@
 """PLY files as trainers write them: one element `vertex` of scalar properties, binary or ascii."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from ..arrays import AnyArray, Floats
 from ..errors import ExportError, listed
 from .files import existing
+from .unread import refuse_unread
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -29,6 +31,7 @@ class Vertices:
         self.path = path
         self.rows = rows
         self.names: tuple[str, ...] = rows.dtype.names or ()
+        self._read: set[str] = set()
 
     def __len__(self) -> int:
         """Number of vertices."""
@@ -45,7 +48,13 @@ class Vertices:
                 found=f"properties {listed(self.names, 12)}",
                 remedy="check that the file belongs to this family of models; gaussian-export --help lists them",
             )
+        self._read.update(names)
         return np.stack([self.rows[name].astype(np.float32) for name in names], 1)
+
+    def refuse_unread(self, ignored: Sequence[str] = (), harmless: str = "(?!)") -> None:
+        """Raises checkpoint/other-family for properties that nobody asked for; normals change nothing."""
+        known = f"n[xyz]|{harmless}"
+        refuse_unread(self.path, "properties", self.names, self._read, ignored=ignored, harmless=known)
 
     def numbered(self, prefix: str) -> Floats:
         """Properties prefix0, prefix1, ... as columns in the order of their numbers; (N,0) where there is none."""

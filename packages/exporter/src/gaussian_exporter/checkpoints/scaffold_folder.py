@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import cast, get_args
 
@@ -14,20 +15,21 @@ from .cfg_args import find_cfg_args, read_cfg_args, require_cfg_args
 from .files import existing, latest_iteration
 from .ply import Vertices, read_ply
 from .torch_file import Weights, read_weights
+from .unread import refuse_unread
 
 _REQUIRED = {"opacity": "opacity_mlp", "colour": "color_mlp", "covariance": "cov_mlp"}
 _NETWORKS = {**_REQUIRED, "feature_bank": "feature_bank_mlp"}
 
 
-def read_scaffold(folder: Path, appearance: int = 0) -> Scaffold:
+def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()) -> Scaffold:
     """Reads the latest iteration. `appearance`: which training image's code to bake in, where the model has any."""
     point_cloud = latest_iteration(existing(folder, "the folder of a Scaffold-GS or Octree-GS training"))
     vertices = read_ply(point_cloud / "point_cloud.ply")
-    networks = read_networks(point_cloud)
+    networks = read_networks(point_cloud, ignored)
     settings = settings_of(folder, "level" in vertices.names)
     anchors = read_anchors(vertices)
     levels = read_levels(vertices, settings)
-    return Scaffold(
+    model = Scaffold(
         **anchors,
         opacity=networks["opacity"].linears(),
         colour=networks["colour"].linears(),
@@ -41,6 +43,11 @@ def read_scaffold(folder: Path, appearance: int = 0) -> Scaffold:
         appearance=read_appearance(networks.get("appearance"), appearance),
         levels=levels,
     )
+    # What INRIA's layout asks for, and anchors do not use.
+    vertices.refuse_unread(ignored, r"opacity|rot_[0-3]")
+    for weights in networks.values():
+        weights.refuse_unread(ignored)
+    return model
 
 
 def settings_of(folder: Path, has_levels: bool) -> dict[str, object]:
@@ -51,15 +58,19 @@ def settings_of(folder: Path, has_levels: bool) -> dict[str, object]:
     return {} if path is None else read_cfg_args(path)
 
 
-def read_networks(folder: Path) -> dict[str, Weights]:
+def read_networks(folder: Path, ignored: Sequence[str] = ()) -> dict[str, Weights]:
     """Either one file of state_dicts, checkpoints.pth, or a traced network in a file of its own each."""
     united = folder / "checkpoints.pth"
     if united.exists():
         weights = read_weights(united)
         names = {**_NETWORKS, "appearance": "appearance"}
+        roots = {name.split(".")[0] for name in weights.tensors}
+        refuse_unread(united, "networks", sorted(roots), names.values(), ignored=ignored)
         found = {role: weights.under(name) for role, name in names.items()}
         return {role: weights for role, weights in found.items() if weights.tensors or role in _REQUIRED}
     files = {**_NETWORKS, "appearance": "embedding_appearance"}
+    there = sorted(path.stem for path in folder.glob("*.pt"))
+    refuse_unread(folder, "networks", there, files.values(), ignored=ignored)
     return {
         role: read_weights(folder / f"{name}.pt")
         for role, name in files.items()

@@ -21,6 +21,7 @@ from ..arrays import AnyArray, Floats
 from ..errors import ExportError, listed
 from ..pieces.mlp import Linear
 from .files import existing
+from .unread import refuse_unread
 
 _STORAGES = {
     "FloatStorage": "f4",
@@ -142,10 +143,13 @@ def _flattened(value: object, name: str) -> list[tuple[str, AnyArray]]:
 class Weights:
     """Named tensors of one file, asked for with the shape that the model needs."""
 
-    def __init__(self, tensors: Mapping[str, AnyArray], where: str):
-        """`where` is the file's name, for messages."""
+    def __init__(self, tensors: Mapping[str, AnyArray], where: str, file: Weights | None = None, prefix: str = ""):
+        """`where` is the file's name, for messages; `file` and `prefix` are of a part of another."""
         self.tensors = tensors
         self.where = where
+        self._prefix = prefix
+        # Names in the file of all tensors that were read, by any part of it.
+        self._read: set[str] = set() if file is None else file._read
 
     def __contains__(self, name: str) -> bool:
         """Whether there is a tensor of that name."""
@@ -161,13 +165,19 @@ class Weights:
                 found=listed(list(self.tensors)),
                 remedy="check that the file belongs to this family of models and is not the optimizer's state",
             )
+        self._read.add(self._prefix + name)
         return np.asarray(self.tensors[name], np.float32)
+
+    def refuse_unread(self, ignored: Sequence[str] = (), harmless: str = "(?!)") -> None:
+        """Raises checkpoint/other-family for tensors that nobody asked for."""
+        names = [self._prefix + name for name in self.tensors]
+        refuse_unread(self.where, "tensors", names, self._read, ignored=ignored, harmless=harmless)
 
     def under(self, prefix: str) -> Weights:
         """The tensors whose names begin with `prefix.`, without it."""
         start = f"{prefix}."
         found = {name[len(start) :]: value for name, value in self.tensors.items() if name.startswith(start)}
-        return Weights(found, f"{self.where}: {prefix}")
+        return Weights(found, f"{self.where}: {prefix}", self, self._prefix + start)
 
     def count(self) -> int:
         """How many numbered layers there are."""

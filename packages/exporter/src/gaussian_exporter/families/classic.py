@@ -4,7 +4,7 @@ Written with its harmonics the file is constant: a page runs it once. With `colo
 in the graph from the camera's position, which makes the output 13 numbers a Gaussian instead of up to 58.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +13,7 @@ import onnx
 
 from ..arrays import Floats, covariances, sigmoid
 from ..checkpoints.ply import Vertices
-from ..contract import Facts, camera_position
+from ..contract import Facts, Filter, camera_position
 from ..errors import ExportError
 from ..graph import Graph
 from ..outputs import Gaussians, Options, finish
@@ -26,13 +26,14 @@ Colours = Literal["sh", "view"]
 @dataclass(frozen=True)
 class Cloud:
     """Gaussians as a PLY file holds them: positions (N,3), log_scales (N,3), rotations (N,4) w x y z, opacity_logits
-    (N,1), sh (N,(degree+1)^2,3)."""
+    (N,1), sh (N,(degree+1)^2,3). filter: with which one it was trained, if the checkpoint says so."""
 
     positions: Floats
     log_scales: Floats
     rotations: Floats
     opacity_logits: Floats
     sh: Floats
+    filter: Filter | None = field(default=None, kw_only=True)
 
 
 def cloud_of_vertices(vertices: Vertices) -> Cloud:
@@ -71,7 +72,8 @@ def filtered(cloud: Cloud, widths: Floats) -> Cloud:
     fainter = np.sqrt(squared.prod(1, keepdims=True) / wider.prod(1, keepdims=True))
     opacity = np.clip(sigmoid(cloud.opacity_logits) * fainter, 1e-12, 1 - 1e-7)
     logits = np.log(opacity) - np.log1p(-opacity)
-    return replace(cloud, log_scales=(0.5 * np.log(wider)).astype(np.float32), opacity_logits=logits.astype(np.float32))
+    wide = (0.5 * np.log(wider)).astype(np.float32)
+    return replace(cloud, log_scales=wide, opacity_logits=logits.astype(np.float32), filter="mip")
 
 
 def usable(cloud: Cloud) -> Cloud:
@@ -88,7 +90,7 @@ def usable(cloud: Cloud) -> Cloud:
             remedy="training diverged; export an earlier checkpoint",
         )
     parts = (cloud.positions, cloud.log_scales, cloud.rotations, cloud.opacity_logits, cloud.sh)
-    return Cloud(*(part[kept] for part in parts))
+    return Cloud(*(part[kept] for part in parts), filter=cloud.filter)
 
 
 def export_classic(
@@ -97,6 +99,8 @@ def export_classic(
     """A generator of the cloud's Gaussians, activated: opacities 0..1, covariances in world units squared."""
     options = options or Options()
     cloud = usable(cloud)
+    if facts.filter is None and not facts.antialiased:
+        facts = replace(facts, filter=cloud.filter)
     graph = Graph("classic", options.weights)
     positions = graph.constant(cloud.positions, "positions", errors="even")
     sh = graph.constant(cloud.sh, "sh")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
+from typing import Literal
 
 import numpy as np
 import onnx
@@ -20,6 +21,7 @@ from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
 from ..pieces.covariance import UPPER
 
+Rotation4D = Literal["reversed", "straight"]
 # A Gaussian is not drawn where it has fallen below this share of itself.
 _LEAST = 0.05
 
@@ -29,7 +31,9 @@ class Gaussian4D:
     """positions (N,3) and times (N,1); log_scales (N,3) and log_scales_t (N,1); rotations (N,4), and rotations_r (N,4)
     of the second quaternion of a rotation in four dimensions, None without; opacity_logits (N,1); sh (N,K,3), of which
     further sets of 16 belong to cos of the distance in time, and of twice it. start and end: seconds that are played;
-    filter: variance of time that is added where there is one."""
+    filter: variance of time that is added where there is one. rotation: the order of axes of the matrices that the two
+    quaternions stand for. The trainer's code has reversed both axes since 2024-09-15, and no checkpoint says by which
+    of the two it was trained."""
 
     positions: Floats
     times: Floats
@@ -42,6 +46,7 @@ class Gaussian4D:
     start: float
     end: float
     filter: float = 0.0
+    rotation: Rotation4D = "reversed"
 
 
 def export_gaussian4d(model: Gaussian4D, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
@@ -99,7 +104,9 @@ def cuts(model: Gaussian4D) -> Cuts:
     if model.rotations_r is None:
         # The trainer takes the scale of time itself for the variance.
         return Cuts(covariances(scales, model.rotations), np.zeros((len(scales), 3)), scale_t + model.filter)
-    half = rotations_4d(model.rotations, model.rotations_r) * np.concatenate([scales, scale_t], 1)[:, None, :]
+    turns = rotations_4d(model.rotations, model.rotations_r)
+    turns = turns[:, ::-1, ::-1] if model.rotation == "reversed" else turns
+    half = turns * np.concatenate([scales, scale_t], 1)[:, None, :]
     full = half @ half.transpose(0, 2, 1)
     across, variance = full[:, :3, 3], full[:, 3:, 3]
     cut = full[:, :3, :3] - across[:, :, None] * across[:, None, :] / variance[:, :, None]
@@ -108,7 +115,7 @@ def cuts(model: Gaussian4D) -> Cuts:
 
 
 def rotations_4d(left: Floats, right: Floats) -> Doubles:
-    """Matrices (N,4,4) of two quaternions w x y z of any length but 0, in the trainer's order of axes."""
+    """Matrices (N,4,4) of two quaternions w x y z of any length but 0, time last."""
     a, b, c, d = (np.float64(left) / np.linalg.norm(np.float64(left), axis=1, keepdims=True)).T
     p, q, r, s = (np.float64(right) / np.linalg.norm(np.float64(right), axis=1, keepdims=True)).T
     from_left = np.stack([a, -b, -c, -d, b, a, -d, c, c, d, a, -b, d, -c, b, a], 1).reshape(-1, 4, 4)
