@@ -7,6 +7,7 @@
 #import shared/plan
 #import shared/group
 #import shared/detail
+#import shared/scene_opacity
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
@@ -43,7 +44,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let slot = page.first_slot + rank;
   let i = survivors[slot] - view.first_group * CULL_GROUP;
   var g = unpack_gaussian(gaussian_at(i));
-  g.opacity = shared_opacity(g.opacity * view.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
+  g.opacity = shared_opacity(thinned_opacity(g.opacity, view.opacity), chunk_shares[view.first_group + i / CULL_GROUP]);
   let e = project_ellipse(view, g);
   let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
   let color = splat_sh_color(i, normalize(toward));

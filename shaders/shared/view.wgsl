@@ -40,7 +40,7 @@ struct View {
   splat_budget: u32,
   // Only splats whose centres lie between these, in page-local coordinates, are drawn.
   crop_low: vec3f,
-  // Factor of the opacity of each splat.
+  // Factor of the optical depth of each splat (shared/scene_opacity): 1 for none.
   opacity: f32,
   crop_high: vec3f,
   // 1 if all rays are parallel: focal lengths are then pixels for each world unit, and the Jacobian's limits 0.

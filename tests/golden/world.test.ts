@@ -447,6 +447,34 @@ test('one scene twice, two viewpoints of one world', async () => {
   free();
 });
 
+test('the opacity of a scene is that of an opaque surface of many splats', async () => {
+  const random = randomSource(9);
+  const wall = {
+    ...blobs(2000, 8, false),
+    positions: Float32Array.from({ length: 6000 }, (_, i) => (i % 3 === 2 ? 0.05 : 3) * (random() - 0.5)),
+    scales: new Float32Array(6000).fill(0.06),
+  };
+  const device = await serialDevice();
+  const scene = await GaussianBuffers.upload(device, packGaussians(wall));
+  const camera = cameraAt([0, 0, -3], [0, 0, 0], { width: 96, height: 64, near: 0.2 });
+  const alphas = async (opacity: number): Promise<Float32Array> => {
+    const world = new World();
+    world.add({ scene, opacity });
+    const viewpoint = new Viewpoint(device, world, {});
+    const pixels = await capture(device, viewpoint, { camera });
+    viewpoint.destroy();
+    return pixels.filter((_, i) => i % 4 === 3);
+  };
+  const whole = await alphas(1);
+  for (const opacity of [0.25, 0.5, 0.75]) {
+    const found = (await alphas(opacity)).filter((_, i) => whole[i] > 0.999);
+    const mean = found.reduce((sum, alpha) => sum + alpha, 0) / found.length;
+    console.log(`opacity ${opacity}: ${mean.toFixed(3)} of ${found.length} opaque pixels`);
+    assert.ok(Math.abs(mean - opacity) < 0.12, `${mean} at ${opacity}`);
+  }
+  scene.destroy();
+});
+
 test('the bounds of a world hold what is visible of it', () => {
   const scene = { pages: [] } as unknown as GaussianScene;
   const bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 } as const;

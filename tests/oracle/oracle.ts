@@ -30,6 +30,7 @@ import { footprintOf } from './footprint.js';
 import { projectEllipse, toCamera, worldPosition } from './projection.js';
 import { RULES, type Mode, type Rules, type RuleSet } from './rules.js';
 import { splatColor } from './sh.js';
+import { thinned } from './thinned.js';
 
 export type { OracleImage } from './blend.js';
 export type { Mode, Rules, RuleSet } from './rules.js';
@@ -87,7 +88,7 @@ export function renderOracleWorld(
     const worldToCamera = sceneToWorld ? multiply(camera.worldToCamera, sceneToWorld) : camera.worldToCamera;
     const isInside = (i: number): boolean =>
       crop === undefined || worldPosition(cloud, i).every((v, axis) => v >= crop.min[axis] && v <= crop.max[axis]);
-    const faded = { ...cloud, opacities: cloud.opacities.map((own, i) => (isInside(i) ? own * opacity : 0)) };
+    const faded = { ...cloud, opacities: cloud.opacities.map((own, i) => (isInside(i) ? thinned(own, opacity) : 0)) };
     const all = screenSplats(faded, { ...camera, worldToCamera }, rules, { rules, mode, order: options.order });
     const start = first;
     first += cloud.count;

@@ -20,6 +20,12 @@ const EVERYWHERE = {
   max: [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32],
 } as const;
 
+/** Optical depth of an opaque surface: the trainer stops painting at this transmittance. */
+const OPAQUE_DEPTH = -Math.log(1e-4);
+
+/** Factor of optical depths with which an opaque surface has a given opacity, as CSS understands it. */
+const opticalFactor = (opacity: number): number => Math.min(1, -Math.log(1 - opacity) / OPAQUE_DEPTH);
+
 /** The pages of the visible scenes of a world, with a `View` uniform for each. */
 export class PageTable {
   #pages: readonly GaussianPage[] = [];
@@ -140,7 +146,7 @@ export class PageTable {
       const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : scene;
       const values = cameraValues(seen, scene.origin, filterVariance * pixelArea);
       const own = {
-        opacity,
+        opacity: opticalFactor(opacity),
         crop_low: relative(crop.min, scene.origin),
         crop_high: relative(crop.max, scene.origin),
         sh_degree: scene.shDegree,

@@ -12,7 +12,7 @@ export interface Placed {
   readonly scene: GaussianScene;
   /** Scene to world, row-major 4x4, last row (0, 0, 0, 1), float64: any affine matrix that can be inverted. Default: the identity. */
   readonly sceneToWorld?: Matrix4 | undefined;
-  /** Factor of the opacity of each splat, 0 to 1. Default: 1. */
+  /** Opacity of the scene, 0 to 1, as of CSS: that of a surface that is opaque at 1. What lies behind several surfaces is hidden more. Default: 1. */
   readonly opacity?: number | undefined;
   /** Only splats whose centres lie in this box, in the scene's own frame, are drawn. */
   readonly crop?: Box | undefined;

@@ -60,7 +60,7 @@ export const SCENE_ATTRIBUTES = {
    */
   up: read(upGrammar),
   /**
-   * Factor of the opacity of its splats, 0 to 1.
+   * Opacity of the scene, 0 to 1: that of a surface which is opaque at 1. Rays that cross several surfaces show more of it.
    * @default `1`
    * @example opacity="0.5"
    */
