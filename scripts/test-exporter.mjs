@@ -1,6 +1,6 @@
 /**
  * `npm run test:exporter`: the Python exporter in a virtual environment of its own (.cache/exporter): ruff, mypy, pytest.
- * `-- --torch` installs PyTorch, too (gigabytes), for what trains and for comparisons with its operators.
+ * `-- --torch` installs PyTorch, too (gigabytes), for what trains, for modules and for comparisons with public code.
  * `-- --webgpu` runs the files on ONNX Runtime's WebGPU provider, in an environment beside it. Other arguments go to pytest.
  */
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
@@ -16,7 +16,7 @@ const rest = given.filter((argument) => !flags.has(argument));
 
 const python = environment(webgpu ? 'webgpu' : 'cpu', [
   ...(webgpu ? ['onnxruntime-webgpu==1.27.0', 'pytest==9.2.0'] : []),
-  ...['--editable', webgpu ? folder : `${folder}[dev${torch ? ',train' : ''}]`],
+  ...['--editable', webgpu ? folder : `${folder}[dev${torch ? ',module,oracles' : ''}]`],
 ]);
 if (webgpu) {
   must(python, ['-m', 'pytest', 'tests/test_webgpu.py', ...rest], { cwd: folder, env: gpuEnvironment() });

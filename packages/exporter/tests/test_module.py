@@ -18,6 +18,8 @@ from gaussian_exporter.conformance import check_outputs
 from gaussian_exporter.contract import Coordinates
 from gaussian_exporter.errors import ExportError
 
+from .running import run
+
 torch: Any = pytest.importorskip("torch")
 pytest.importorskip("onnxscript")
 COUNT = 64
@@ -71,7 +73,7 @@ def test_a_module_in_one_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 class Arm(torch.nn.Module):  # type: ignore[misc]
-    """The angle's length with a little added: PyTorch's own exporter drops that, and the rest pose becomes NaN."""
+    """The angle's length with a little added: PyTorch's rewriter drops that, and the rest pose becomes NaN."""
 
     def forward(self, pose: Any) -> Any:
         angle = pose[0].norm() + 1e-8
@@ -86,16 +88,136 @@ class Arm(torch.nn.Module):  # type: ignore[misc]
         }
 
 
-def test_the_exporter_that_computes_what_pytorch_computes_is_taken(tmp_path: Path) -> None:
+def test_a_small_addend_survives(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     layout = gs.split("positions", "covariances", "colors", "opacities")
-    report = gs.export_module(Arm(), {"pose": gs.pose(["hip"], [-1])}, layout, out=tmp_path / "arm.onnx", quiet=True)
-    assert max(report.errors.values()) < 1e-5
-    assert re.search(
-        r"dynamo: .*: positions has 192 of 192 numbers .*not finite.* at its inputs' defaults", str(report)
-    )
-    written = check_outputs(onnx.load(tmp_path / "arm.onnx"))
-    assert np.isfinite(written["positions"]).all() and written["covariances"].shape == (COUNT, 6)
+    # With a default elsewhere than zero the rest pose is tried all the same.
+    for rest in (None, [0.1] * 3):
+        inputs = {"pose": gs.pose(["hip"], [-1], rest=rest)}
+        report = gs.export_module(Arm(), inputs, layout, out=tmp_path / "arm.onnx")
+        assert max(report.errors.values()) < 1e-6 and report.exporter == "dynamo"
+        assert sum(len(text.splitlines()) for text in capfd.readouterr()) <= 12
+        still = run(onnx.load(report.path), {"pose": np.zeros((1, 3))})
+        assert np.isfinite(still["positions"]).all() and still["covariances"].shape == (COUNT, 6)
     assert contract_of(report.path)["inputs"]["pose"]["joints"] == ["hip"]
+
+
+class Bare(Arm):
+    """The same without the addend: the module itself is NaN at rest."""
+
+    def forward(self, pose: Any) -> Any:
+        written = super().forward(pose)
+        return {**written, "positions": written["positions"] * (pose.norm() / pose.norm())}
+
+
+def test_a_rest_pose_of_nan_is_refused_by_the_name_of_the_output(tmp_path: Path) -> None:
+    layout = gs.split("positions", "covariances", "colors", "opacities")
+    inputs = {"pose": gs.pose(["hip"], [-1], rest=[0.1] * 3)}
+    with pytest.raises(ExportError, match=r"output positions.*of the module, with pose = 0 0 0"):
+        gs.export_module(Bare(), inputs, layout, out=tmp_path / "arm.onnx", quiet=True)
+    assert not (tmp_path / "arm.onnx").exists()
+
+
+class Rig(torch.nn.Module):  # type: ignore[misc]
+    """Rotations as SMPL's code has them (batch_rodrigues), scales by diag_embed, and inverses of matrices."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        draw = torch.Generator().manual_seed(2)
+        self.register_buffer("points", torch.randn(COUNT, 3, generator=draw))
+        self.register_buffer("scales", torch.rand(COUNT, 3, generator=draw) * 0.1 + 0.01)
+        self.register_buffer("bind", torch.linalg.qr(torch.randn(4, 4, generator=draw))[0])
+
+    def forward(self, pose: Any, camera: Any) -> Any:
+        angle = torch.norm(pose + 1e-8, dim=1, keepdim=True)
+        x, y, z = torch.split(pose / angle, 1, dim=1)
+        zero = torch.zeros((1, 1))
+        k = torch.cat([zero, -z, y, z, zero, -x, -y, x, zero], dim=1).view(1, 3, 3)
+        turn = (torch.eye(3) + angle.sin() * k + (1 - angle.cos()) * torch.bmm(k, k))[0]
+        eye = camera.inverse()[:3, 3] + torch.linalg.inv(self.bind)[:3, 3]
+        half = turn @ torch.inverse(torch.eye(3) + 0.1 * turn) @ torch.diag_embed(self.scales)
+        return self.points @ turn.T + 0.01 * eye, half @ half.mT, self.points.sigmoid(), torch.ones(COUNT)
+
+
+def test_rodrigues_diagonals_and_inverses(tmp_path: Path) -> None:
+    layout = gs.split("positions", "covariances", "colors", "opacities", colors="linear")
+    inputs = {"pose": gs.pose(["hip"], [-1]), "camera": gs.view()}
+    before = torch.linalg.inv, torch.inverse, torch.Tensor.inverse
+    report = gs.export_module(Rig(), inputs, layout, out=tmp_path / "rig.onnx", quiet=True)
+    assert max(report.errors.values()) < 1e-5 and report.findings == []
+    assert before == (torch.linalg.inv, torch.inverse, torch.Tensor.inverse)
+    written = run(onnx.load(report.path), {"pose": np.zeros((1, 3)), "camera": np.eye(4)})
+    linear = Rig().points.sigmoid().numpy()
+    assert np.allclose(written["colors"], 1.055 * linear ** (1 / 2.4) - 0.055, atol=1e-5)
+
+
+def test_the_code_of_smpl_itself(tmp_path: Path) -> None:
+    """smplx.lbs, with a body of random numbers: its model files may not be in a repository."""
+    lbs = pytest.importorskip("smplx.lbs").lbs
+    draw = torch.Generator().manual_seed(4)
+    joints, parents = 5, torch.tensor([-1, 0, 1, 1, 3])
+    weights = torch.softmax(4 * torch.randn(COUNT, joints, generator=draw), 1)
+    body = {
+        "v_template": torch.randn(COUNT, 3, generator=draw),
+        "shapedirs": 0.1 * torch.randn(COUNT, 3, 4, generator=draw),
+        "posedirs": 0.01 * torch.randn(9 * (joints - 1), 3 * COUNT, generator=draw),
+        "J_regressor": torch.softmax(4 * torch.randn(joints, COUNT, generator=draw), 1),
+    }
+
+    class Body(torch.nn.Module):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            for name, value in body.items():
+                self.register_buffer(name, value)
+
+        def forward(self, pose: Any, betas: Any) -> Any:
+            given = (self.v_template[None], self.shapedirs, self.posedirs, self.J_regressor, parents, weights)
+            vertices, _ = lbs(betas, pose, *given)
+            covariances = 0.01 * torch.tensor([1.0, 0, 0, 1, 0, 1]).repeat(COUNT, 1)
+            return vertices, covariances, vertices[0].sigmoid(), torch.ones(COUNT, 1)
+
+    layout = gs.split("positions", "covariances", "colors", "opacities")
+    inputs = {"pose": gs.pose(joints, flat=True), "betas": gs.shape(4)}
+    report = gs.export_module(Body(), inputs, layout, out=tmp_path / "smpl.onnx", batched=True, quiet=True)
+    assert max(report.errors.values()) < 1e-5 and report.findings == []
+
+
+class Views(torch.nn.Module):  # type: ignore[misc]
+    """Two images in one tensor, weights in bfloat16."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.head = torch.nn.Conv2d(3, 4, 3, padding=1)
+
+    def forward(self, images: Any) -> Any:
+        x = self.head(images).permute(0, 2, 3, 1).reshape(-1, 4)
+        covariances = 0.01 * torch.tensor([1.0, 0, 0, 1, 0, 1]).repeat(len(x), 1)
+        return x[:, :3], covariances, x[:, :3].sigmoid(), x[:, 3].sigmoid()
+
+
+def test_views_in_one_tensor_and_weights_in_bfloat16(tmp_path: Path) -> None:
+    layout = gs.split("positions", "covariances", "colors", "opacities")
+    module = Views().bfloat16()
+    inputs = {"images": gs.image(12, 8, views=2)}
+    report = gs.export_module(module, inputs, layout, out=tmp_path / "views.onnx", quiet=True)
+    assert "weights of 16 bits became float32: head.weight, head.bias" in str(report)
+    assert module.head.weight.dtype == torch.bfloat16
+    model = onnx.load(report.path)
+    assert [d.dim_value for d in model.graph.input[0].type.tensor_type.shape.dim] == [2, 3, 8, 12]
+    assert all(tensor.data_type != onnx.TensorProto.BFLOAT16 for tensor in model.graph.initializer)
+
+
+def test_a_temporal_filter_keeps_what_it_returns_second(tmp_path: Path) -> None:
+    class Temporal(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, image: Any, previous: Any, keep: Any) -> Any:
+            kept = image * (1 - keep) + previous * keep
+            return kept, kept
+
+    inputs = {"image": gs.image(16, 8), "previous": gs.state([1, 3, 8, 16]), "keep": gs.control(0, 0.98, 0.9)}
+    for layout in (gs.image_output(), gs.image_output(state="previous")):
+        report = gs.export_module(Temporal(), inputs, layout, out=tmp_path / "t.onnx", quiet=True)
+        contract = contract_of(report.path)
+        assert contract["inputs"]["previous"]["output"] == "next_previous"
+        assert contract["outputs"] == {"layout": "image", "image": "processed"}
 
 
 class Eye(torch.nn.Module):  # type: ignore[misc]

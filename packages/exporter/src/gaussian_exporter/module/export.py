@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import inspect
-import io
-import logging
-import re
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -21,17 +16,16 @@ from ..arrays import AnyArray
 from ..conformance import SHARES, check_outputs
 from ..contract import Coordinates, Filter, Json, metadata
 from ..errors import ExportError, listed
-from ..placement import RULES, Finding, gpu_findings, told
+from ..placement import Finding, gpu_findings, told
 from ..written import box_of, read
+from .capture import OPSETS, captured, cause, widened
 from .finish import finish_graph
-from .layouts import Layout, split
+from .layouts import Layout, split, with_state
 from .roles import Role
 from .trial import difference, in_torch, said, told_difference, tried, weights_of, wrapped_module
 
 # Largest difference to PyTorch, as a share of the largest number of an output.
 _ALLOWED = 1e-3
-# What TorchScript's exporter writes best, and what PyTorch's own writes and still has all kernels.
-_OPSETS = {"dynamo": RULES["exportOpset"], "TorchScript": 17}
 
 
 @dataclass(frozen=True)
@@ -101,9 +95,9 @@ def export_module(
     """
     import torch
 
-    layout, path = outputs or split(), Path(out)
+    layout, path = with_state(outputs or split(), inputs), Path(out)
     module = module if isinstance(module, torch.nn.Module) else _module_of(module, torch)
-    module.eval()
+    module, narrow = widened(module.eval(), torch)
     refuse_other_arguments(module, inputs)
     tries, expected = tried(module, inputs, layout, batched, n_max, torch)
     wrapped = wrapped_module(module, inputs, layout, batched, torch)
@@ -112,17 +106,17 @@ def export_module(
     facts = _facts(inputs, n_max, fps, antialiased, filter)
     contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **facts}
     contract |= {"coordinates": Coordinates.of(coordinates).json(), "license": license, "attribution": attribution}
-    refusals = []
-    for exporter in _OPSETS:
+    refusals: list[str] = []
+    for exporter in OPSETS:
         try:
-            model = _export(wrapped, inputs, layout, exporter, torch)
+            model = captured(wrapped, inputs, layout.outputs, exporter, torch)
             finish_graph(model, layout, inputs, expected, n_max)
             contract["inputs"] = _bindings(model, inputs, layout)
             complete = contract | bounds | _rows(model, layout, n_max, expected)
             onnx.helper.set_model_props(model, metadata(complete))
             errors, worst = _errors(model, tries, expected, layout)
         except Exception as error:  # an exporter may fail in any way of its own
-            refusals.append(f"{exporter}: {_cause(error)}")
+            refusals.append(f"{exporter}: {cause(error)}")
             continue
         if not max(errors.values(), default=0.0) <= _ALLOWED:
             refusals.append(f"{exporter}: computes other numbers than PyTorch: {worst}")
@@ -131,11 +125,17 @@ def export_module(
         for finding in findings:
             if finding.is_refused:
                 raise finding.error()
-        check_outputs(model, {n: x for n, x in tries[0].items() if n in contract["inputs"]})  # type: ignore[operator]
+        try:
+            check_outputs(model, {n: x for n, x in tries[0].items() if n in contract["inputs"]})  # type: ignore[operator]
+        except ExportError as error:
+            # The other exporter may not lose what this one has lost.
+            refusals.append(f"{exporter}: {error}")
+            continue
         path.write_bytes(model.SerializeToString())
         unused = [f"input {each} is not used: the file has none" for each in inputs if each not in contract["inputs"]]  # type: ignore[operator]
         doubles = [name for _, name, each in weights_of(module) if each.dtype == torch.float64]
-        narrowed = [f"float64, which pages do not cast, became float32: {listed(doubles)}"] if doubles else []
+        narrowed = [f"weights of 16 bits became float32: {listed(narrow)}"] if narrow else []
+        narrowed += [f"float64, which pages do not cast, became float32: {listed(doubles)}"] if doubles else []
         notes = [*(f"not taken: {refusal}" for refusal in refusals), *unused, *narrowed]
         report = ExportReport(path, exporter, model.opset_import[0].version, complete, errors, findings, notes)
         if not quiet:
@@ -186,29 +186,6 @@ def _module_of(function: Callable[..., Any], torch: Any) -> Any:
             return function(*given)
 
     return Function()
-
-
-def _export(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, exporter: str, torch: Any) -> onnx.ModelProto:
-    args = tuple(torch.from_numpy(role.default.copy()) for role in inputs.values())
-    names = {"input_names": list(inputs), "output_names": list(layout.outputs), "opset_version": _OPSETS[exporter]}
-    # What an exporter has to say of its failures is said in their errors.
-    logging.getLogger("torch").setLevel(logging.CRITICAL)
-    with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
-        warnings.simplefilter("ignore")
-        if exporter == "dynamo":
-            program = torch.onnx.export(wrapped, args, dynamo=True, external_data=False, verbose=False, **names)
-            return cast(onnx.ModelProto, onnx.ModelProto.FromString(program.model_proto.SerializeToString()))
-        file = io.BytesIO()
-        torch.onnx.export(wrapped, args, file, dynamo=False, **names)
-        return onnx.load_from_string(file.getvalue())
-
-
-def _cause(error: BaseException) -> str:
-    """What an exporter stumbled over, in a line: its own error wraps that in advice and colours of a terminal."""
-    while error.__cause__ is not None:
-        error = error.__cause__
-    lines = [line for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines() if line.strip()]
-    return f"{type(error).__name__}: {lines[0].strip() if lines else ''}"
 
 
 def _bindings(model: onnx.ModelProto, inputs: Mapping[str, Role], layout: Layout) -> Json:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from ..contract import Json
 from ..errors import ExportError
+from .roles import Role
 
 # In the order in which a module that returns a tuple gives them.
 ATTRIBUTES = ("positions", "covariances", "scales", "rotations", "colors", "sh", "opacities")
@@ -24,6 +25,8 @@ class Layout:
     state: str | None = None
     # Keys of the dict that the module returns, where they are not the names.
     keys: Mapping[str, str] | None = None
+    # Whether its colors are linear light.
+    is_linear: bool = False
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -43,14 +46,15 @@ def split(
     opacities: Literal["linear", "logit"] = "linear",
     rotations: Literal["wxyz", "xyzw"] = "wxyz",
     sh: Literal["coefficient-major", "channel-major"] = "coefficient-major",
+    colors: Literal["srgb", "linear"] = "srgb",
     count: bool = False,
     state: str | None = None,
 ) -> Layout:
     """A tensor for each attribute: split("positions", "scales", "rotations", "colors", "opacities") in the order that
     the module returns them. Of a module that returns a dict any order, or its own keys: split({"positions": "xyz",
-    "opacities": "alpha", ...}). `scales="log"` and `opacities="logit"` for numbers
-    before their activation. Without names: those five. `state`: the input with the role state() that takes, in the
-    next run, what the module returns last."""
+    "opacities": "alpha", ...}). `scales="log"` and `opacities="logit"` for numbers before their activation;
+    `colors="linear"` for linear light, which the file converts to sRGB. Without names: those five. `state`: the input
+    with the role state() that takes, in the next run, what the module returns last; without it, the only such input."""
     keys = names[0] if names and isinstance(names[0], Mapping) else None
     plain = tuple(keys) if keys is not None else tuple(name for name in names if isinstance(name, str))
     given = plain or ("positions", "scales", "rotations", "colors", "opacities")
@@ -64,7 +68,7 @@ def split(
         words["shOrder"] = sh
     if count:
         words["count"] = "count"
-    return Layout("split", (*given, "count") if count else given, words, state, keys)
+    return Layout("split", (*given, "count") if count else given, words, state, keys, colors == "linear")
 
 
 def packed(
@@ -79,9 +83,15 @@ def packed(
     return Layout("packed", ("gaussians", "count") if count else ("gaussians",), words)
 
 
-def image_output() -> Layout:
-    """A post-processor: one picture [1,3,H,W] in 0..1."""
-    return Layout("image", ("processed",), {})
+def image_output(state: str | None = None) -> Layout:
+    """A post-processor: one image [1,3,H,W] in 0..1. `state`: as for split()."""
+    return Layout("image", ("processed",), {}, state)
+
+
+def with_state(layout: Layout, inputs: Mapping[str, Role]) -> Layout:
+    """The layout, with the only input that has the role state() if it names none."""
+    names = [name for name, role in inputs.items() if role.binding["role"] == "state"]
+    return layout if layout.state is not None or len(names) != 1 else replace(layout, state=names[0])
 
 
 def tensors_of(result: Any, layout: Layout) -> list[Any]:
@@ -96,7 +106,12 @@ def tensors_of(result: Any, layout: Layout) -> list[Any]:
         return [result[key] for key in keys]
     tensors = list(result) if isinstance(result, (tuple, list)) else [result]
     if len(tensors) != len(layout.outputs):
-        raise _mismatch(f"{len(layout.outputs)} tensors ({', '.join(layout.outputs)})", str(len(tensors)))
+        remedy = (
+            _IN_ORDER
+            if layout.kind != "image"
+            else 'if the second is kept for the next run: image_output(state="NAME")'
+        )
+        raise _mismatch(f"{len(layout.outputs)} tensors ({', '.join(layout.outputs)})", str(len(tensors)), remedy)
     return tensors
 
 
@@ -128,11 +143,17 @@ def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
         return torch.stack([upper[:, i] for i in (0, 1, 2, 4, 5, 8)], -1)
     if name == "scales" and (x.dim() == 1 or (x.dim() == 2 and x.shape[-1] == 1)):
         return x.reshape(-1, 1).expand(-1, 3).clone()
-    if name == "colors" and x.dim() == 2 and x.shape[-1] == 4:
-        return x[:, :3]
+    if name == "colors" and x.dim() == 2:
+        return _srgb(x[:, :3], torch) if layout.is_linear else x[:, :3]
     if name == "opacities" and x.dim() == 1:
         return x[:, None]
     return x
+
+
+def _srgb(linear: Any, torch: Any) -> Any:
+    """The transfer function of IEC 61966-2-1."""
+    clamped = linear.clamp(0, 1)
+    return torch.where(clamped <= 0.0031308, clamped * 12.92, 1.055 * clamped.clamp(min=0.0031308) ** (1 / 2.4) - 0.055)
 
 
 def _quaternions(rows: Any, torch: Any) -> Any:
@@ -150,6 +171,7 @@ def _quaternions(rows: Any, torch: Any) -> Any:
 
 _NO_ROTATION = "take the scales out of them; R S S^T R^T is 'covariances'"
 _IN_ORDER = "name what it returns, in its order: outputs=split('positions', 'covariances', 'colors', 'opacities')"
+_ONE_IMAGE = 'return the image alone; with what the next run is given: inputs={..., "NAME": state([1, 3, H, W])}'
 _BY_KEY = "say which key is what: outputs=split({'positions': 'xyz', 'covariances': 'cov', 'colors': 'rgb', ...})"
 
 

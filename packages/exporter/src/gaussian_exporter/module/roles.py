@@ -19,6 +19,8 @@ class Role:
     binding: Json
     shape: tuple[int, ...]
     samples: Sequence[AnyArray]
+    # Where lengths and differences of it vanish, if a page can give that.
+    zero: AnyArray | None = None
 
     @property
     def default(self) -> AnyArray:
@@ -31,7 +33,7 @@ def _floats(shape: tuple[int, ...], *values: object) -> list[AnyArray]:
 
 
 # No simple shares of a period: a loop would be tried in the same state again and again.
-_SHARES = (0.0, 0.131, 0.367, 0.618, 0.887, 1.0)
+_SHARES = (0.0, 0.131, 0.367, 0.5, 0.618, 0.887, 1.0)
 
 
 def time(duration: float | None = None, normalized: bool = False, shape: Sequence[int] = (1,)) -> Role:
@@ -42,9 +44,8 @@ def time(duration: float | None = None, normalized: bool = False, shape: Sequenc
     unit = "normalized" if normalized else "seconds"
     end = 1.0 if normalized else (duration or 1.0)
     sizes = tuple(shape)
-    return Role(
-        {"role": "time", "unit": unit, "_duration": duration}, sizes, _floats(sizes, *(s * end for s in _SHARES))
-    )
+    binding: Json = {"role": "time", "unit": unit, "_duration": duration}
+    return Role(binding, sizes, _floats(sizes, *(s * end for s in _SHARES)))
 
 
 def control(
@@ -65,7 +66,9 @@ def control(
     binding: Json = {"role": "control", "range": [low, high], "default": plain, **stepped, **named}
     sizes = tuple(shape)
     rest = np.reshape(np.asarray(plain, np.float32), sizes) if isinstance(plain, list) else plain
-    return Role(binding, sizes, _floats(sizes, rest, low, high, low + 0.618 * (high - low)))
+    zero = np.zeros(sizes, np.float32) if low <= 0 <= high else None
+    middle = low + 0.5 * (high - low)
+    return Role(binding, sizes, _floats(sizes, rest, low, high, low + 0.618 * (high - low), middle), zero)
 
 
 def pose(
@@ -94,7 +97,8 @@ def pose(
     if parents is not None:
         binding["parents"] = [int(parent) for parent in parents]
     binding["default"] = [float(x) for x in still.reshape(-1)]
-    return Role(binding, sizes, [still, *(_bent(still, size, format) for size in (0.2, 0.6))])
+    zero = np.tile(np.asarray(unit, np.float32), still.size // len(unit)).reshape(sizes)
+    return Role(binding, sizes, [still, *(_bent(still, size, format) for size in (0.2, 0.6))], zero)
 
 
 def _bent(still: AnyArray, size: float, format: str) -> AnyArray:
@@ -111,7 +115,7 @@ def shape(count: int, names: Sequence[str] | None = None) -> Role:
     binding: Json = {"role": "shape", "default": [0.0] * count}
     if names is not None:
         binding["names"] = list(names)
-    return Role(binding, (count,), _floats((count,), 0, np.linspace(-1, 1, count)))
+    return Role(binding, (count,), _floats((count,), 0, np.linspace(-1, 1, count)), np.zeros(count, np.float32))
 
 
 def camera() -> Role:
@@ -154,7 +158,8 @@ def state(shape: Sequence[int], default: float = 0.0) -> Role:
     sizes = tuple(shape)
     rng = np.random.default_rng(0)
     binding: Json = {"role": "state", "default": default}
-    return Role(binding, sizes, [*_floats(sizes, default), rng.normal(size=sizes).astype(np.float32)])
+    samples = [*_floats(sizes, default), rng.normal(size=sizes).astype(np.float32)]
+    return Role(binding, sizes, samples, np.zeros(sizes, np.float32))
 
 
 def projection(axes: str = "RDF") -> Role:
@@ -175,11 +180,11 @@ def viewport() -> Role:
     return Role({"role": "viewport"}, (2,), _floats((2,), [640, 480], [1920, 1080]))
 
 
-def image(width: int, height: int) -> Role:
-    """[1,3,H,W]: red, green and blue planes in 0..1, top row first."""
-    rng = np.random.default_rng(0)
-    pictures = [rng.random((1, 3, height, width)).astype(np.float32) for _ in range(2)]
-    return Role({"role": "image"}, (1, 3, height, width), pictures)
+def image(width: int, height: int, views: int = 1) -> Role:
+    """[1,3,H,W], or [V,3,H,W] of several views: red, green and blue planes in 0..1, top row first."""
+    rng, sizes = np.random.default_rng(0), (views, 3, height, width)
+    images = [rng.random(sizes).astype(np.float32) for _ in range(2)]
+    return Role({"role": "image"}, sizes, images, np.zeros(sizes, np.float32))
 
 
 def frame() -> Role:

@@ -1,0 +1,137 @@
+"""PyTorch's two exporters, with the parts of them switched off that change numbers, and operators that ONNX lacks."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import logging
+import re
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, cast
+
+import onnx
+
+from ..placement import RULES
+from .roles import Role
+
+# What TorchScript's exporter writes best, and what PyTorch's own writes and still has all kernels.
+OPSETS = {"dynamo": RULES["exportOpset"], "TorchScript": 17}
+# What an exporter says of an operator that it lacks: what a module can be written with instead.
+_INSTEAD = {
+    "diag_embed": "write torch.diag_embed(s) as s[..., None] * torch.eye(n)",
+    "linalg_inv|inverse": "matrices of up to 4 rows are inverted by torch.linalg.inv; larger ones need a closed form",
+    "linalg_svd|_svd": "leave the decomposition away: write covariances instead of scales and rotations",
+    "linalg_solve": "multiply by torch.linalg.inv of the matrix, of up to 4 rows",
+    "nonzero|masked_select|index.Tensor": "keep every row, and write opacity 0 into those that are not wanted",
+    "GuardOnDataDependent|data-dependent": "do not branch on numbers: use torch.where",
+    "complex|fft": "write real and imaginary parts as tensors of their own",
+}
+
+
+def captured(
+    wrapped: Any, inputs: Mapping[str, Role], outputs: Sequence[str], exporter: str, torch: Any
+) -> onnx.ModelProto:
+    """The module as one exporter writes it."""
+    args = tuple(torch.from_numpy(role.default.copy()) for role in inputs.values())
+    names = {"input_names": list(inputs), "output_names": list(outputs), "opset_version": OPSETS[exporter]}
+    # What an exporter has to say of its failures is said in their errors.
+    logging.getLogger("torch").setLevel(logging.CRITICAL)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings())
+        stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        stack.enter_context(closed_inverses(torch))
+        warnings.simplefilter("ignore")
+        if exporter == "dynamo":
+            # Its rewriter takes constants of 1e-8 for zero: the addend that keeps many a rest pose finite.
+            options = {"dynamo": True, "external_data": False, "verbose": False, "optimize": False}
+            return folded(torch.onnx.export(wrapped, args, **options, **names).model)
+        file = io.BytesIO()
+        torch.onnx.export(wrapped, args, file, dynamo=False, **names)
+        return onnx.load_from_string(file.getvalue())
+
+
+def folded(model: Any) -> onnx.ModelProto:
+    """A model of onnx_ir with constants folded and nothing twice, and no number changed."""
+    import onnx_ir as ir
+    import onnx_ir.passes.common as passes
+    from onnxscript import optimizer
+
+    passes.InlinePass()(model)
+    optimizer.fold_constants(model, onnx_shape_inference=True)
+    quiet = logging.getLogger("onnx_ir")
+    level = quiet.level
+    quiet.setLevel(logging.CRITICAL)
+    ir.passes.Sequential(
+        passes.RemoveUnusedNodesPass(),
+        passes.RemoveUnusedFunctionsPass(),  # type: ignore[no-untyped-call]
+        passes.RemoveUnusedOpsetsPass(),
+        passes.LiftConstantsToInitializersPass(lift_all_constants=True, size_limit=0),
+        passes.DeduplicateInitializersPass(),
+        passes.CommonSubexpressionEliminationPass(),
+        passes.OutputFixPass(),
+        passes.NameFixPass(),
+    )(model)
+    quiet.setLevel(level)
+    return cast(onnx.ModelProto, onnx.ModelProto.FromString(ir.serde.serialize_model(model).SerializeToString()))
+
+
+@contextlib.contextmanager
+def closed_inverses(torch: Any) -> Iterator[None]:
+    """Inverses of matrices of up to 4 rows in products and sums, since ONNX has no operator for them."""
+    owners = ((torch, "inverse"), (torch.linalg, "inv"), (torch.Tensor, "inverse"))
+    before = [getattr(owner, name) for owner, name in owners]
+    try:
+        for owner, name in owners:
+            setattr(owner, name, lambda matrix, _=torch.linalg.inv: inverse(matrix, torch, _))
+        yield
+    finally:
+        for (owner, name), own in zip(owners, before, strict=True):
+            setattr(owner, name, own)
+
+
+def inverse(matrix: Any, torch: Any, other: Any) -> Any:
+    """The adjugate over the determinant (..., n, n), n up to 4, by cofactors."""
+    size = matrix.shape[-1]
+    if size > 4:
+        return other(matrix)
+    entries = [[matrix[..., row, column] for column in range(size)] for row in range(size)]
+    cofactors = [[_minor(entries, row, column) for column in range(size)] for row in range(size)]
+    determinant = sum(entries[0][i] * cofactors[0][i] for i in range(size))
+    rows = [torch.stack([cofactors[column][row] for column in range(size)], -1) for row in range(size)]
+    return torch.stack(rows, -2) / determinant[..., None, None]
+
+
+def _minor(entries: list[list[Any]], row: int, column: int) -> Any:
+    """The signed determinant without one row and one column."""
+    rest = [[x for j, x in enumerate(line) if j != column] for i, line in enumerate(entries) if i != row]
+    if not rest:
+        return entries[0][0] * 0 + 1
+    value = rest[0][0] if len(rest) == 1 else sum(rest[0][j] * _minor(rest, 0, j) for j in range(len(rest)))
+    return -value if (row + column) % 2 else value
+
+
+def widened(module: Any, torch: Any) -> tuple[Any, list[str]]:
+    """The module in float32, a copy if it has weights in 16 bits, and their names: pages have no kernels for bfloat16,
+    and float16 only on some devices."""
+    narrow = [
+        name
+        for weights in (module.named_parameters(), module.named_buffers())
+        for name, tensor in weights
+        if tensor.dtype in (torch.bfloat16, torch.float16)
+    ]
+    return (copy.deepcopy(module).float(), narrow) if narrow else (module, narrow)
+
+
+def cause(error: BaseException) -> str:
+    """What an exporter stumbled over, in a line: its own error wraps that in advice and colors of a terminal."""
+    whole = str(error)
+    while error.__cause__ is not None:
+        error = error.__cause__
+        whole += str(error)
+    lines = [line for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines() if line.strip()]
+    remedy = next((each for pattern, each in _INSTEAD.items() if re.search(pattern, whole)), "")
+    line = lines[0].strip()[:300] if lines else ""
+    return f"{type(error).__name__}: {line}{f' ({remedy})' * bool(remedy)}"
