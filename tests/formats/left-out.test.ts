@@ -3,10 +3,10 @@ import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { needsSharedData, sharedPath } from '../support/data.js';
-import { expectRefusal } from './support/expect.js';
+import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
 import { buildGltf, writeGlb } from './support/gltf-writer.js';
 import { writePly, type PlyColumn, type PlyWriterElement } from './support/ply-writer.js';
 import { smallCloud } from './support/small-cloud.js';
@@ -131,30 +131,90 @@ const CASES: Readonly<Record<string, RegExp>> = {
   'axes-source.ply': /^3 splats classic$/,
   'glb-3.7.0-right.glb': /^3 splats classic$/,
   'glb-legacy-cesium-spz.glb': /decode\/unsupported.*KHR_spz_gaussian_splats_compression/,
-  'glb-log-scales-2.3.1.glb': /^3 splats classic$/,
+  'glb-log-scales-2.3.1.glb': /^3 splats classic The glTF has logarithms/,
   'gsplat-png-meta.json': /decode\/unsupported.*gsplat's PNG compression/,
   'mip-source.ply': /^\d+ splats 0\.1$/,
   'scene.lcc': /decode\/unsupported.*LCC scene/,
-  'spz-splat-transform-2.7.1.spz': /^3 splats classic$/,
-  'spz-splat-transform-3.7.0.spz': /^3 splats classic$/,
+  'spz-splat-transform-2.7.1.spz': /^3 splats classic assumed$/,
+  'spz-splat-transform-3.7.0.spz': /^3 splats classic assumed$/,
   'stg-lite.ply': /decode\/unsupported.*SpacetimeGaussians/,
   'tileset.json': /decode\/unsupported.*3D Tiles/,
   'up-nerfstudio-z.ply': /^\d+ splats classic up 0 0 1$/,
 };
-const SCENE = /\.(ply|glb|gltf|spz|sog|splat|ksplat|lcc|lcc2|usd.?|pt|npz|splatv|zip)$|(^|-)(meta|tileset)\.json$/;
+/** Those of the third review; opacities and the first position that their source has. */
+const LATER_CASES: Readonly<Record<string, RegExp>> = {
+  'activated.ply': /^60 splats classic No scale_/,
+  'axes-source.ply': /^3 splats classic$/,
+  'glb-gsbox-4.8.4.glb': /^60 splats classic The glTF has logarithms .* and logits/,
+  'khr-linear.glb': /^60 splats classic Colors are linear/,
+  'khr-log-mixed.glb': /^60 splats classic The glTF has logarithms in place of scales,/,
+  'khr-log.glb': /^60 splats classic The glTF has logarithms in place of scales,/,
+  'khr-logit-only.glb': /^60 splats classic The glTF has logits in place of opacities,/,
+  'khr-right.glb': /^60 splats classic$/,
+  'opacity-plain.ply': /^60 splats classic All opacities/,
+  'scene.spx': /decode\/unsupported.*Reall3dViewer/,
+  'sharp-colorspace-1.ply': /^60 splats classic Colors are linear/,
+  'source.ply': /^60 splats classic$/,
+  'source0.ply': /^60 splats classic$/,
+  'spz-gsbox-4.8.4.spz': /^3 splats classic assumed$/,
+  'spz-niantic-ply_to_spz.spz': /^3 splats classic assumed$/,
+  'spz-system-12.spz': /^60 splats classic$/,
+  'up-nerfstudio.ply': /^60 splats classic up 0 0 1$/,
+};
+const SCENE = /\.(ply|glb|gltf|spz|spx|sog|splat|ksplat|lcc|lcc2|usd.?|pt|npz|splatv|zip)$|(^|-)(meta|tileset)\.json$/;
 
-test('every case of the review of formats is right, or rightly named', { skip: needsSharedData }, async (context) => {
-  const folder = sharedPath('../cases/formats');
-  const files = readdirSync(folder).filter((file) => SCENE.test(file));
-  assert.ok(files.length >= 12, `${files.length} files`);
-  for (const file of files) {
-    const found = await readScene(readFileSync(`${folder}/${file}`), { name: file }).then(
-      ({ count, antialiased, filterVariance, hints }) =>
-        `${count} splats ${antialiased ? (filterVariance ?? 0.3) : 'classic'}${hints?.up ? ` up ${hints.up.join(' ')}` : ''}`,
-      (error: unknown) => (error instanceof GaussianSplatError ? `${error.code} ${error.message}` : String(error)),
-    );
-    context.diagnostic(`${file}: ${found}`);
-    // What comes later must at least be told.
-    assert.match(found, CASES[file] ?? /^\d+ splats|decode\/(unsupported|not-splats)/, file);
+for (const [folder, cases] of [
+  ['formats', CASES],
+  ['formats-3', LATER_CASES],
+] as const) {
+  test(`every case of ${folder} is right, or rightly named`, { skip: needsSharedData }, async (context) => {
+    const path = sharedPath(`../cases/${folder}`);
+    const files = readdirSync(path).filter((file) => SCENE.test(file));
+    assert.ok(files.length >= 12, `${files.length} files`);
+    for (const file of files) {
+      const found = await readScene(readFileSync(`${path}/${file}`), { name: file }).then(
+        describe,
+        (error: unknown) => (error instanceof GaussianSplatError ? `${error.code} ${error.message}` : String(error)),
+      );
+      context.diagnostic(`${file}: ${found}`);
+      // What comes later must at least be told.
+      assert.match(found, cases[file] ?? /^\d+ splats|decode\/(unsupported|not-splats)/, file);
+    }
+  });
+}
+
+const describe = ({ count, antialiased, filterVariance, hints, warnings = [] }: GaussianCloud): string =>
+  [
+    `${count} splats ${antialiased ? (filterVariance ?? 0.3) : 'classic'}`,
+    ...(hints?.up ? [`up ${hints.up.join(' ')}`] : []),
+    ...(hints?.isUpAssumed ? ['assumed'] : []),
+    ...warnings,
+  ].join(' ');
+
+test('what tools made of one scene has the numbers of its source', { skip: needsSharedData }, async () => {
+  const read = (file: string): Promise<GaussianCloud> =>
+    readScene(readFileSync(sharedPath(`../cases/formats-3/${file}`)), { name: file });
+  const [source, gltf, right] = await Promise.all(['source.ply', 'source0.ply', 'khr-right.glb'].map(read));
+  for (const file of ['khr-log.glb', 'khr-log-mixed.glb', 'khr-logit-only.glb']) {
+    const cloud = await read(file);
+    assertAtMost(largestDifference(cloud.opacities, gltf.opacities), 1e-6, `${file}, opacities`);
+    assertAtMost(largestDifference(cloud.positions, right.positions), 1e-6, `${file}, positions`);
+    if (file !== 'khr-log-mixed.glb') assertAtMost(largestDifference(cloud.scales, gltf.scales), 1e-6, `${file}, scales`);
   }
+  // gsbox sorts splats.
+  const gsbox = await read('glb-gsbox-4.8.4.glb');
+  const byPlace = (cloud: GaussianCloud): number[] =>
+    Array.from({ length: 60 }, (_, i) => i).sort((a, b) => cloud.positions[3 * a] - cloud.positions[3 * b]);
+  const [mine, others] = [byPlace(source), byPlace(gsbox)];
+  mine.forEach((i, n) => {
+    const j = others[n];
+    assertAtMost(Math.abs(source.opacities[i] - gsbox.opacities[j]), 1 / 255, 'opacity by gsbox');
+    for (let k = 0; k < 3; k++) {
+      assertAtMost(Math.abs(source.positions[3 * i + k] - gsbox.positions[3 * j + k]), 1e-6, 'position by gsbox');
+      assertAtMost(Math.abs(source.scales[3 * i + k] - gsbox.scales[3 * j + k]), 1e-6, 'scale by gsbox');
+    }
+  });
+  const turned = await read('spz-system-12.spz');
+  assertAtMost(largestDifference(turned.positions, source.positions), 1.3e-4, 'positions of system 12');
+  assertAtMost(largestDifference(turned.sh, source.sh), 0.1, 'harmonics of system 12');
 });

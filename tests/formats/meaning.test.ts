@@ -82,15 +82,21 @@ for (const [property, kind] of [
 }
 
 /** A GLB of two splats with these scales by this tool. */
-function glbWith(scales: readonly number[], generator: string): Uint8Array {
-  const numbers = [...[0, 0, 0, 1, 1, 1], ...scales, ...[0, 0, 0, 1, 0, 0, 0, 1], ...[0.5, 0.5], ...[0, 0, 0, 0, 0, 0]];
+function glbWith(
+  scales: readonly number[],
+  generator: string,
+  opacities: readonly number[] = [0.5, 0.5],
+  colors: readonly number[] = [0, 0, 0, 0, 0, 0],
+  splats: object = {},
+): Uint8Array {
+  const numbers = [...[0, 0, 0, 1, 2, 3], ...scales, ...[0, 0, 0, 1, 0, 0, 0, 1], ...opacities, ...colors];
   const data = Buffer.from(new Float32Array(numbers).buffer);
   const views = [24, 24, 32, 8, 24];
   const types = ['VEC3', 'VEC3', 'VEC4', 'SCALAR', 'VEC3'];
   const starts = views.map((_, k) => views.slice(0, k).reduce((sum, bytes) => sum + bytes, 0));
   const names = ['SCALE', 'ROTATION', 'OPACITY', 'SH_DEGREE_0_COEF_0'].map((name) => `KHR_gaussian_splatting:${name}`);
   const attributes = Object.fromEntries(['POSITION', ...names].map((name, k) => [name, k]));
-  const primitive = { mode: 0, attributes, extensions: { KHR_gaussian_splatting: {} } };
+  const primitive = { mode: 0, attributes, extensions: { KHR_gaussian_splatting: splats } };
   const json = {
     asset: { version: '2.0', generator },
     ...{ scenes: [{ nodes: [0] }], nodes: [{ mesh: 0 }], meshes: [{ primitives: [primitive] }] },
@@ -108,6 +114,9 @@ const scaleCases: readonly [string, readonly number[], readonly number[]][] = [
   ['splat-transform 2.5.0', [1, 2, 3, -1, -1, -1], [1, 2, 3, -1, -1, -1].map(Math.exp)],
   ['splat-transform v3.7.0', [1, 2, 3, 1, 1, 1], [1, 2, 3, 1, 1, 1]],
   ['another', [1, 2, 3, 1, 1, 1], [1, 2, 3, 1, 1, 1]],
+  ['another', [-1, -2, -3, -1, -1, -1], [-1, -2, -3, -1, -1, -1].map(Math.exp)],
+  // One is enough: the extension has no scales below 0.
+  ['another', [1, 2, 3, 1, -1, 1], [1, 2, 3, 1, -1, 1].map(Math.exp)],
 ];
 for (const [generator, written, scales] of scaleCases) {
   test(`scales ${written.join(' ')} of a GLB by ${generator}`, async () => {
@@ -117,8 +126,89 @@ for (const [generator, written, scales] of scaleCases) {
   });
 }
 
-test('scales that are all below 0 are named, whoever wrote them', async () => {
-  await expectRefusal(glbWith([-1, -2, -3, -1, -1, -1], 'another'), 'decode/corrupt', /logarithms/);
+test('opacities of a GLB outside of 0..1 are logits, and what was converted is said', async () => {
+  const file = glbWith([1, 1, 1, 1, 1, 1], 'another', [-2, 0.5]);
+  const { opacities, warnings } = await readScene(file, { name: 'a.gltf' });
+  [-2, 0.5].forEach((logit, i) => assert.ok(Math.abs(opacities[i] - 1 / (1 + Math.exp(-logit))) < 1e-6));
+  assert.match(warnings!.join(), /logits in place of opacities/);
+  const plain = await readScene(glbWith([1, 1, 1, 1, 1, 1], 'another', [0, 1]), { name: 'a.gltf' });
+  assert.deepEqual([[...plain.opacities], plain.warnings], [[0, 1], undefined]);
+});
+
+test('tools that wrote logarithms in the frame of PLY are known by their names', async () => {
+  const places = async (generator: string, scale: number): Promise<number[]> => {
+    const { positions } = await readScene(glbWith([1, 1, 1, 1, 1, scale], generator), { name: 'a.gltf' });
+    return [...positions.subarray(3)];
+  };
+  assert.deepEqual(await places('gsbox v4.8.4', -1), [1, 2, 3]);
+  assert.deepEqual(await places('splat-transform 1.10.1', 1), [1, 2, 3]);
+  // The frame of glTF: left, up, forward.
+  assert.deepEqual(await places('another', -1), [-1, -2, 3]);
+  assert.deepEqual(await places('gsbox v5', 1), [-1, -2, 3]);
+});
+
+/** The coefficient of a constant color. */
+const coefficientOf = (color: number): number => (color - 0.5) / 0.28209479177387814;
+
+test('linear colors of a GLB are encoded as sRGB, and the cloud says so', async () => {
+  const linear = [0, 0.002, 0.214, 0.5, 1, 2];
+  const file = glbWith([1, 1, 1, 1, 1, 1], 'another', [1, 1], linear.map(coefficientOf), {
+    colorSpace: 'lin_rec709_display',
+  });
+  const { sh, warnings } = await readScene(file, { name: 'a.gltf' });
+  // IEC 61966-2-1.
+  const expected = [0, 0.02584, 0.49999, 0.73536, 1, 1.35326];
+  expected.forEach((color, k) => assert.ok(Math.abs(sh[k] - coefficientOf(color)) < 1e-3, `${k}: ${sh[k]}`));
+  assert.match(warnings!.join(), /Colors are linear/);
+});
+
+/** A PLY of so many splats whose scales and opacities are as given, and the element color_space of SHARP. */
+function sharpLike(
+  opacities: PlyColumn,
+  logScale: number,
+  { space, count = 60 }: { readonly space?: number; readonly count?: number } = {},
+): Uint8Array {
+  const columns = inriaColumns(rawSplats(count, 1)).map((column) => {
+    if (column.name === 'opacity') return opacities;
+    return column.name.startsWith('scale_')
+      ? { ...column, values: column.values.map((_, i) => logScale + 0.01 * (i % 7)) }
+      : column;
+  });
+  const value = [{ name: 'color_space', type: 'uchar', values: [space ?? 0] }] satisfies PlyColumn[];
+  return writePly([
+    { name: 'vertex', columns },
+    ...(space === undefined ? [] : [{ name: 'color_space', columns: value }]),
+  ]);
+}
+const opacitiesOf = (type: PlyColumn['type'], count: number, value: (i: number) => number): PlyColumn => ({
+  ...{ name: 'opacity', type, values: Array.from({ length: count }, (_, i) => value(i)) },
+});
+
+test('a PLY with numbers that look activated says so, and only such a one', async () => {
+  const warningsOf = async (file: Uint8Array): Promise<string> =>
+    ((await readScene(file, { name: 'a.ply' })).warnings ?? []).join();
+  const inside = opacitiesOf('float', 60, (i) => (i % 11) / 10);
+  assert.match(await warningsOf(sharpLike(inside, -3)), /All opacities are in 0..1/);
+  assert.match(await warningsOf(sharpLike(inside, 0.1)), /No scale_\* is below 0 and all opacities/);
+  assert.equal(await warningsOf(sharpLike(opacitiesOf('float', 60, (i) => (i % 11) / 10 - 0.1), 0.1)), '');
+  // Of so few, all may be so by chance.
+  assert.equal(await warningsOf(sharpLike(opacitiesOf('float', 20, () => 0.5), 0.1, { count: 20 })), '');
+});
+
+test('opacities of a PLY that are integers are shares of the largest', async () => {
+  const { opacities, warnings } = await readScene(sharpLike(opacitiesOf('uchar', 60, (i) => 4 * i), -3));
+  opacities.forEach((opacity, i) => assert.ok(Math.abs(opacity - (4 * i) / 255) < 1e-6));
+  assert.equal(warnings, undefined);
+});
+
+test('the color space of SHARP is obeyed', async () => {
+  const logits = opacitiesOf('float', 60, (i) => i - 30);
+  const [plain, linear] = await Promise.all(
+    [0, 1].map((space) => readScene(sharpLike(logits, -3, { space }), { name: 'a.ply' })),
+  );
+  assert.equal(plain.warnings, undefined);
+  assert.match(linear.warnings!.join(), /Colors are linear \(color_space 1 of SHARP\)/);
+  assert.ok(Math.abs(plain.sh[0] - linear.sh[0]) > 0.01);
 });
 
 const named: readonly [string, string, RegExp][] = [

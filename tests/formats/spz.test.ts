@@ -1,12 +1,14 @@
 import assert from 'node:assert/strict';
-import { gzipSync } from 'node:zlib';
+import { gunzipSync, gzipSync } from 'node:zlib';
 import { test } from 'node:test';
 import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
+import { transformCloud } from '../../packages/formats/src/transform/transform-cloud.js';
 import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
 import { extensionRecord, spzBody, writeSpz, type SpzWriterOptions } from './support/spz-writer.js';
-import { activated, rawSplats, type RawSplats } from './support/splats.js';
+import { writePly } from './support/ply-writer.js';
+import { activated, inriaColumns, rawSplats, type RawSplats } from './support/splats.js';
 
 const VERSIONS = [1, 2, 3, 4] as const;
 /** 1 - |dot| that the quantisation of rotations costs at most: 8 bits, or 9 bits of magnitude. */
@@ -55,6 +57,48 @@ test('the number of fractional bits scales the positions', async () => {
   assertAtMost(largestDifference(positions, splats.positions.flat()), 2 ** -19, 'positions');
 });
 
+test('systems whose third axis is vertical turn positions, rotations and harmonics', async () => {
+  const raw = rawSplats(20, 3);
+  // Turned harmonics are larger, and have to stay within -1..1.
+  const splats = { ...raw, sh: raw.sh.map((s) => s.map((c) => c.map((value) => Math.fround(0.3 * value)))) };
+  // Second axis forward or back, third axis down or up, and the frame that a quarter turn about x makes of right, down, forward.
+  const turn = (cloud: GaussianCloud): GaussianCloud => {
+    transformCloud(cloud, [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0]);
+    return cloud;
+  };
+  // (x, z, -y): right, forward, up is system 12 in SPZ's splat-types.h.
+  const source = await readScene(writePly([{ name: 'vertex', columns: inriaColumns(splats) }]));
+  const inFile = turn(source);
+  const [encoding] = encodingsFor('a.spz').slice(-1);
+  const written = await encoding.write({ cloud: inFile, degrees: new Uint8Array(20).fill(3) });
+  const body = new Uint8Array(gunzipSync(written));
+  const system = body.length - 4;
+  assert.equal(body[system], 6, 'the writer names right, down, forward');
+  body[system] = 12;
+  assertHolds(await readScene(body), splats, 3);
+});
+
+test('the marks of writers decide the frame of files that name none, which the cloud reports', async () => {
+  const splats = rawSplats(20, 3);
+  const cases: [SpzWriterOptions, NonNullable<SpzWriterOptions['axes']>][] = [
+    [{ version: 1 }, [1, -1, -1]],
+    [{ version: 2 }, [1, 1, 1]],
+    [{ version: 2, antialiased: true }, [1, -1, -1]],
+    [{ version: 3 }, [1, 1, 1]],
+    [{ version: 3, antialiased: true }, [1, 1, 1]],
+    [{ version: 3, fractionalBits: 16 }, [1, -1, -1]],
+    [{ version: 4 }, [1, 1, 1]],
+  ];
+  for (const [options, axes] of cases) {
+    const cloud = await readScene(writeSpz(splats, { ...options, axes }));
+    assertHolds(cloud, splats, options.version);
+    assert.equal(cloud.hints?.isUpAssumed, true);
+  }
+  const named = extensionRecord(0xadbe0003, Uint8Array.of(4, 0, 0, 0));
+  const cloud = await readScene(writeSpz(splats, { version: 3, extensions: named, axes: [1, -1, -1] }));
+  assert.equal(cloud.hints?.isUpAssumed, undefined);
+});
+
 test('extensions are skipped, save the one that names the coordinate system', async () => {
   const splats = rawSplats(20, 3);
   const other = extensionRecord(0xadbe0002, new Uint8Array(12));
@@ -62,8 +106,8 @@ test('extensions are skipped, save the one that names the coordinate system', as
   const both = (value: number) => new Uint8Array(Buffer.concat([other, system(value)]));
   // Right-down-front is system 6, left-up-front 7, left-down-back 1: see CoordinateSystem in SPZ's splat-types.h.
   const cases: [Uint8Array, SpzWriterOptions['axes']][] = [
-    [other, [1, -1, -1]],
-    [both(0), [1, -1, -1]],
+    [other, [1, 1, 1]],
+    [both(0), [1, 1, 1]],
     [both(4), [1, -1, -1]],
     [both(6), [1, 1, 1]],
     [both(7), [-1, -1, 1]],
@@ -74,8 +118,8 @@ test('extensions are skipped, save the one that names the coordinate system', as
       assertHolds(await readScene(writeSpz(splats, { version, extensions, axes })), splats, version);
     }
   }
-  const swapped = writeSpz(splats, { version: 4, extensions: both(12) });
-  await expectRefusal(swapped, 'decode/unsupported', /extension 0xADBE0003.*found 12/);
+  const unknown = writeSpz(splats, { version: 4, extensions: both(17) });
+  await expectRefusal(unknown, 'decode/unsupported', /extension 0xADBE0003.*found 17/);
 });
 
 test('a header that names another version than the body has is refused', async () => {
@@ -200,7 +244,7 @@ test('a gzip bomb behind a small header is not inflated', async () => {
 
 test('gzip of something else is named', async () => {
   const gzip = (text: string) => new Uint8Array(gzipSync(Buffer.from(text)));
-  await expectRefusal(gzip('ply\nformat ascii 1.0\n'), 'decode/unknown-format', /inside the gzip file.*a PLY file/);
+  await expectRefusal(gzip('ply\nformat ascii 1.0\n'), 'decode/truncated', /PLY header/);
   await expectRefusal(gzip('<!doctype html><p>no</p>'), 'decode/unknown-format', /a web page/);
   await expectRefusal(gzip(''), 'decode/unknown-format', /inside the gzip file/);
   await expectRefusal(gzip('NGSP'), 'decode/truncated', /SPZ header of 16 bytes, found 4/);

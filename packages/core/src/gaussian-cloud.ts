@@ -41,6 +41,8 @@ export interface LevelRun {
 export interface CloudHints {
   /** The direction of the cloud's frame that points up, of length 1. */
   readonly up?: Vector3;
+  /** Whether the file names no frame, so that the direction of up was assumed from the marks of its writer. */
+  readonly isUpAssumed?: boolean;
   /** The tool that wrote the file, in its own words. */
   readonly generator?: string;
   /** `pixel`: the scene was trained with splats ordered pixel by pixel, as StopThePop does. */

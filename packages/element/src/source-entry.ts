@@ -203,7 +203,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   }
 
   get wantsPreviews(): boolean {
-    return this.#stage!.isVisible;
+    return this.#stage!.wantsPreviews;
   }
 
   get memoryBudget(): number | undefined {

@@ -295,6 +295,11 @@ export class Stage
     return this.#visibility.isVisible;
   }
 
+  /** Whether previews are of use: an eager load begins before it is known whether the element is in view. */
+  get wantsPreviews(): boolean {
+    return !this.#visibility.isKnownHidden;
+  }
+
   /** Somebody would see the scene. */
   get isInSight(): boolean {
     return this.isVisible && this.reveal.mayReveal;

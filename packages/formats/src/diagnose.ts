@@ -1,6 +1,6 @@
 /** Says what a file is that is no scene: loaded when one has been refused. */
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
-import { grouped, quote } from './bytes.js';
+import { asciiOf, grouped, quote } from './bytes.js';
 import { foreignName, sampleText, type ForeignName } from './foreign-signatures.js';
 import { UNREAD_KINDS, unreadKind, type UnreadKind } from './unread-kinds.js';
 
@@ -62,6 +62,19 @@ const ONNX_MODEL: ForeignKind = {
   remedy: NOT_A_SCENE,
 };
 
+/** SuperSplat's and splat-transform's viewer, which may have the scene in it. */
+const VIEWER_PAGE: ForeignKind = {
+  code: 'decode/html',
+  found: 'the page of a viewer (SuperSplat), not the scene that it shows',
+  remedy: 'give the address of the scene file, or export the scene again as .sog, .spz or .ply',
+};
+
+/** Such pages have their title, or the setup of their viewer, within so many bytes. */
+const PAGE_BYTES = 65_536;
+
+const isViewerPage = (bytes: Uint8Array): boolean =>
+  /<title>\s*SuperSplat|sse-viewer|supersplat-viewer/i.test(asciiOf(bytes, 0, PAGE_BYTES));
+
 /** Kinds whose signature is weak: asked for only where neither content nor name speaks for a scene. */
 function unsignedKind(bytes: Uint8Array): ForeignKind {
   if (isOnnx(bytes)) return ONNX_MODEL;
@@ -88,6 +101,7 @@ export function diagnose(
   // A JSON text may be one of them; whatever else has a signature is none.
   const known = !signed || signed === 'json' ? unreadKind(bytes, sampleText(bytes), extension) : undefined;
   if (known) return refusal(unread(known), name, undefined);
+  if (signed === 'html' && isViewerPage(bytes)) return refusal(VIEWER_PAGE, name, bytes, expected);
   return signed
     ? refusal(SIGNED_KINDS[signed], name, bytes, expected)
     : refusal(unsignedKind(bytes), name, bytes, expected);

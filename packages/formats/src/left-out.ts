@@ -1,9 +1,8 @@
 /** Loaded where much of a file cannot be drawn. */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
+import { reasonsOf } from './scene-errors.js';
 
-/** Of `GaussianCloud.faults`, in their order. */
-const FAULTS = ['a scale below 0', 'no rotation', 'no extent', 'values that are not finite or too large'];
 /** Of fewer than so many hundredths of the file's splats nobody can tell what the scene was. */
 const LEAST_PERCENT = 10;
 
@@ -14,8 +13,7 @@ const LEAST_PERCENT = 10;
 export function withLeftOut(cloud: GaussianCloud, name: string): GaussianCloud {
   const { count, droppedCount, faults = [], warnings = [] } = cloud;
   const all = count + droppedCount;
-  const reasons = FAULTS.flatMap((fault, k) => (faults[k] > 0 ? [`${grouped(faults[k])} with ${fault}`] : []));
-  const found = `${grouped(droppedCount)} of ${grouped(all)} splats cannot be drawn: ${reasons.join(', ')}`;
+  const found = `${grouped(droppedCount)} of ${grouped(all)} splats cannot be drawn: ${reasonsOf(faults)}`;
   if (100 * count >= LEAST_PERCENT * all) return { ...cloud, warnings: [...warnings, `${found}. They are left out.`] };
   throw new GaussianSplatError('decode/corrupt', {
     where: name,

@@ -224,7 +224,7 @@ export function movedCloud(
   }
   const usable = keepUsable(cloud);
   if (usable.count > 0) return usable;
-  throw noSplats(name, usable.droppedCount);
+  throw noSplats(name, usable);
 }
 
 /** Turns quaternions further, about axes as long as the angles. */

@@ -89,7 +89,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   const cloud = keepUsable(whole);
   signal?.throwIfAborted();
   const { count, droppedCount } = cloud;
-  if (count === 0) throw noSplats(name, droppedCount);
+  if (count === 0) throw noSplats(name, cloud);
   if (droppedCount <= MOST_DROPPED * (count + droppedCount)) return cloud;
   const { withLeftOut } = await loadLeftOut();
   return withLeftOut(cloud, name);

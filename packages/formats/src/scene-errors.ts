@@ -1,5 +1,5 @@
 /** Errors of whole scenes, of any format. */
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 
 /** The error for a file without a byte. */
@@ -12,16 +12,26 @@ export function emptyFile(name: string): GaussianSplatError {
   });
 }
 
+/** Reasons of {@link GaussianCloud.faults}, in their order. */
+const FAULTS = ['a scale below 0', 'no rotation', 'no extent', 'values that are not finite or too large'];
+
+/** The counted reasons why splats of a cloud cannot be drawn. */
+export const reasonsOf = (faults: readonly number[]): string =>
+  FAULTS.flatMap((fault, k) => (faults[k] > 0 ? [`${grouped(faults[k])} with ${fault}`] : [])).join(', ');
+
 /** The error for a scene of which nothing can be drawn. */
-export function noSplats(name: string, droppedCount: number): GaussianSplatError {
+export function noSplats(name: string, { droppedCount, faults = [] }: GaussianCloud): GaussianSplatError {
   return new GaussianSplatError('decode/empty', {
     where: name,
     expected: '1 splat or more that can be drawn',
     found:
       droppedCount === 0
         ? '0 splats'
-        : `${grouped(droppedCount)} splats, all with values that cannot be drawn (not finite, no rotation or no extent)`,
-    remedy: 'export the scene again; this file has nothing to show',
+        : `${grouped(droppedCount)} splats that cannot be drawn: ${reasonsOf(faults)}`,
+    remedy:
+      faults[0] > 0
+        ? 'export the scene again with scales that are 0 or more, not their logarithms'
+        : 'export the scene again; this file has nothing to show',
   });
 }
 

@@ -21,6 +21,8 @@ export interface SceneSource {
   readonly isPrefix?: boolean;
   /** Only these splats are wanted; readers that cannot leave the others out do not know it. See `splatRanges`. */
   readonly range?: SplatRange;
+  /** True for an SPZ that a glTF holds: its frame is the one of SPZ's specification. */
+  readonly isWithinGltf?: boolean;
   /** Opens the files that a scene of several files names; absent where there is only the one. */
   readonly openPart?: OpenPart;
   /** Which level of a scene with levels of detail is read: 0 is the finest. `all`: all of them, in the runs that `GaussianCloud.levelRuns` tells. */

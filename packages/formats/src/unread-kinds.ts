@@ -39,6 +39,23 @@ export const UNREAD_KINDS: readonly UnreadKind[] = [
     fits: (bytes) => startsWith(bytes, [0x4b, 0x67, 0, 0]),
   },
   {
+    found: 'a .spx scene of Reall3dViewer',
+    remedy: 'convert it to SPZ or PLY with gsbox',
+    extensions: /^spx$/,
+    fits: (bytes) => startsWith(bytes, 'spx') && bytes[3] > 0 && bytes[3] < 16,
+  },
+  {
+    found: 'a .4dgs sequence, whose splats move',
+    remedy: 'export each moment as a PLY or SPZ of its own, and show them as a sequence',
+    extensions: /^4dgs$/,
+    fits: (bytes) => startsWith(bytes, '\x894DGS'),
+  },
+  {
+    found: 'a head of LAM, whose splats follow an animated mesh',
+    remedy: 'export the splats of one pose as PLY, or a generator that holds the mesh',
+    within: /(^|\/)offset\.ply$/i,
+  },
+  {
     found: 'a scene of OpenUSD (USD, USDZ)',
     remedy: 'save its splats (ParticleField3DGaussianSplat) as PLY or SPZ with the tool that wrote it',
     extensions: /^usd[acz]?$/,

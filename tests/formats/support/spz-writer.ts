@@ -8,8 +8,18 @@ export interface SpzWriterOptions {
   /** Extension records, already encoded. */
   readonly extensions?: Uint8Array;
   readonly fractionalBits?: number;
-  /** Axes of the file relative to x right, y down, z forward; default right-up-back. */
+  /** Axes of the file relative to x right, y down, z forward; default: {@link usualAxes}. */
   readonly axes?: readonly [number, number, number];
+}
+
+/** The frame that tools write without naming it: Niantic's apps (versions 1 and 2) and tools with other fractional bits right-up-back, converters the frame of PLY. */
+export function usualAxes({
+  version,
+  antialiased,
+  fractionalBits = 12,
+}: SpzWriterOptions): NonNullable<SpzWriterOptions['axes']> {
+  const isNative = version === 1 || (version === 2 && antialiased === true);
+  return isNative || fractionalBits !== 12 ? [1, -1, -1] : [1, 1, 1];
 }
 
 const clampByte = (value: number): number => Math.min(255, Math.max(0, Math.round(value)));
@@ -86,10 +96,8 @@ export function headerOf(splats: RawSplats, options: SpzWriterOptions, streamCou
 }
 
 /** Positions, opacities, colours, scales, rotations and harmonics, in the order of the file. */
-function streamsOf(
-  splats: RawSplats,
-  { version, fractionalBits = 12, axes = [1, -1, -1] }: SpzWriterOptions,
-): Uint8Array[] {
+function streamsOf(splats: RawSplats, options: SpzWriterOptions): Uint8Array[] {
+  const { version, fractionalBits = 12, axes = usualAxes(options) } = options;
   const bytes = (values: readonly number[]): Uint8Array => Uint8Array.from(values);
   const coordinates = splats.positions.flatMap((p) => p.map((value, axis) => value * axes[axis]));
   const fixed = coordinates.flatMap((value) => {

@@ -11,30 +11,31 @@ const MAX_FRACTIONAL_BITS = 20;
 /** The largest coordinate of 24 bits, in steps. */
 const MOST_STEPS = 2 ** 23 - 1;
 
-/** Signs on the way to right, up, back; for quaternions (x, y, z), and for coefficients of degrees 1 to 3. */
-const AXIS_SIGNS = [1, -1, -1];
-const QUATERNION_SIGNS = [1, -1, -1];
-const HARMONIC_SIGNS = [-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1];
+/** The frame of the numbers, a cloud's own, which current converters keep and expect: right, down, forward is system 6 of the extension 0xADBE0003. */
+const FRAME = [0xadbe0003, 4, 6];
+const FLAG_ANTIALIASED = 1;
+const FLAG_EXTENSIONS = 2;
 
 /**
- * Writes SPZ version 3 (Niantic), with as many bits after the point of the coordinates as 24 bits allow.
+ * Writes SPZ version 3 (Niantic) in the frame of PLY, which it names, with as many bits after the point of the coordinates as 24 bits allow.
  * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607
  */
 export async function writeSpz(cloud: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
   const { count, shDegree, antialiased } = cloud;
   const coefficients = shCoefficientCount(shDegree) - 1;
   const fractionalBits = fractionalBitsOf(cloud);
-  const body = new Uint8Array(16 + count * (20 + 3 * coefficients));
+  const body = new Uint8Array(16 + count * (20 + 3 * coefficients) + 4 * FRAME.length);
   const view = new DataView(body.buffer);
   // "NGSP", version, count.
   [0x5053474e, 3, count].forEach((value, k) => view.setUint32(4 * k, value, true));
-  body.set([shDegree, fractionalBits, antialiased ? 1 : 0, 0], 12);
+  body.set([shDegree, fractionalBits, (antialiased ? FLAG_ANTIALIASED : 0) | FLAG_EXTENSIONS, 0], 12);
   let at = 16;
   at = packPositions(cloud, 2 ** fractionalBits, body, at);
   at = packColours(cloud, body, at);
   for (const scale of cloud.scales) body[at++] = byte(16 * (Math.log(scale) + 10));
   for (let i = 0; i < count; i++, at += 4) view.setUint32(at, packRotation(cloud.rotations, 4 * i), true);
-  packHarmonics(cloud, options.shBits, body, at);
+  at = packHarmonics(cloud, options.shBits, body, at);
+  FRAME.forEach((value, k) => view.setUint32(at + 4 * k, value, true));
   return gzip(body);
 }
 
@@ -58,7 +59,7 @@ export function fractionalBitsOf({ positions, origin }: Pick<GaussianCloud, 'pos
 
 function packPositions({ positions, origin }: GaussianCloud, unit: number, out: Uint8Array, at: number): number {
   positions.forEach((value, k) => {
-    const fixed = Math.round(AXIS_SIGNS[k % 3] * (value + origin[k % 3]) * unit);
+    const fixed = Math.round((value + origin[k % 3]) * unit);
     out.set([fixed & 255, (fixed >> 8) & 255, (fixed >> 16) & 255], at + 3 * k);
   });
   return at + 3 * positions.length;
@@ -75,7 +76,7 @@ function packColours({ count, opacities, sh, shDegree }: GaussianCloud, out: Uin
 
 /** Two bits for the largest of (x, y, z, w), then a sign and nine bits of magnitude for each of the others. */
 function packRotation(rotations: Float32Array, at: number): number {
-  const q = [1, 2, 3, 0].map((k, n) => rotations[at + k] * (QUATERNION_SIGNS[n] ?? 1));
+  const q = [1, 2, 3, 0].map((k) => rotations[at + k]);
   const largest = q.reduce((best, value, k) => (Math.abs(value) > Math.abs(q[best]) ? k : best), 0);
   const flip = q[largest] < 0;
   let word = largest;
@@ -88,17 +89,18 @@ function packRotation(rotations: Float32Array, at: number): number {
   return word >>> 0;
 }
 
-function packHarmonics({ count, sh, shDegree }: GaussianCloud, bits: number, out: Uint8Array, at: number): void {
+function packHarmonics({ count, sh, shDegree }: GaussianCloud, bits: number, out: Uint8Array, at: number): number {
   const numbers = shCoefficientCount(shDegree);
   const step = 2 ** (8 - bits);
   for (let i = 0; i < count; i++) {
     for (let k = 1; k < numbers; k++) {
       for (let channel = 0; channel < 3; channel++) {
-        const value = 128 + 128 * HARMONIC_SIGNS[k - 1] * sh[3 * (numbers * i + k) + channel];
+        const value = 128 + 128 * sh[3 * (numbers * i + k) + channel];
         out[at++] = byte(128 + step * Math.round((value - 128) / step));
       }
     }
   }
+  return at;
 }
 
 async function gzip(bytes: Uint8Array<ArrayBuffer>): Promise<Uint8Array<ArrayBuffer>> {

@@ -12,7 +12,8 @@ export class VisibilityController implements ReactiveController {
   readonly #element: HTMLElement;
   readonly #onChange: () => void;
   #observer: IntersectionObserver | undefined;
-  #isVisible = false;
+  /** Undefined until the observer has reported. */
+  #isVisible: boolean | undefined;
 
   constructor(host: ReactiveControllerHost & HTMLElement, onChange: () => void) {
     this.#element = host;
@@ -21,7 +22,12 @@ export class VisibilityController implements ReactiveController {
   }
 
   get isVisible(): boolean {
-    return this.#isVisible;
+    return this.#isVisible === true;
+  }
+
+  /** Whether the element is known to be out of view: not before the first report. */
+  get isKnownHidden(): boolean {
+    return this.#isVisible === false;
   }
 
   hostConnected(): void {
@@ -37,11 +43,12 @@ export class VisibilityController implements ReactiveController {
   hostDisconnected(): void {
     this.#observer?.disconnect();
     this.#set(false);
+    this.#isVisible = undefined;
   }
 
   #set(isVisible: boolean): void {
-    if (isVisible === this.#isVisible) return;
+    const wasVisible = this.isVisible;
     this.#isVisible = isVisible;
-    this.#onChange();
+    if (isVisible !== wasVisible) this.#onChange();
   }
 }

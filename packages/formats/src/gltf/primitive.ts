@@ -1,7 +1,7 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { allocateCloud, expInPlace, SH_C0, type DraftCloud } from '../cloud.js';
-import { damaged } from '../faults.js';
+import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
+import { damaged, warn } from '../faults.js';
 import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
 import { transformCloud } from '../transform/transform-cloud.js';
@@ -40,8 +40,23 @@ export function splatsIn(
   return { count: document.accessorCount(own.POSITION), shDegree: degreeOf((name) => own[`${EXTENSION}:${name}`]) };
 }
 
+/** Scales and opacities of an uncompressed primitive as its accessors have them; none of what it lacks. */
+export async function shapesIn(
+  document: GltfDocument,
+  { attributes }: Json,
+  path: string,
+): Promise<Pick<GaussianCloud, 'scales' | 'opacities'>> {
+  if (!isObject(attributes)) return document.fail(`${path}.attributes`, 'an object', attributes);
+  const read = async (name: string): Promise<Float32Array> => {
+    const index = attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
+    return index === undefined ? new Float32Array(0) : (await document.readAccessor(index)).values;
+  };
+  return { scales: await read('SCALE'), opacities: await read('OPACITY') };
+}
+
 /**
- * Reads a primitive with `KHR_gaussian_splatting` into a cloud in the frame of its node.
+ * Reads a primitive with `KHR_gaussian_splatting` into a cloud in the frame of its node. Scales and opacities of an uncompressed one are as its accessors have them: see
+ * `activationOf`. Colors are in the space that {@link hasLinearColors} tells.
  * @param range splats of an uncompressed primitive that are read; default all
  */
 export async function readPrimitive(
@@ -50,9 +65,21 @@ export async function readPrimitive(
   path: string,
   source: Pick<SceneSource, 'budget' | 'signal'>,
   range?: SplatRange,
-): Promise<GaussianCloud> {
+): Promise<DraftCloud> {
   const splats = splatsOf(primitive);
-  requireKnown(document, splats, path);
+  const cloud = await readNumbers(document, primitive, path, source, range);
+  noteUnknown(cloud, splats);
+  return cloud;
+}
+
+async function readNumbers(
+  document: GltfDocument,
+  primitive: Json,
+  path: string,
+  source: Pick<SceneSource, 'budget' | 'signal'>,
+  range: SplatRange | undefined,
+): Promise<DraftCloud> {
+  const splats = splatsOf(primitive);
   const compression = isObject(splats.extensions) ? splats.extensions : {};
   const spz = SPZ_EXTENSIONS.map((name) => compression[name]).find(isObject);
   if (spz) return readCompressed(document, spz, path, source);
@@ -67,11 +94,25 @@ export async function readPrimitive(
   return readAttributes(document, primitive, path, range);
 }
 
-function requireKnown(document: GltfDocument, splats: Json, path: string): void {
-  const { kernel = 'ellipse', colorSpace = 'srgb_rec709_display' } = splats;
-  if (kernel !== 'ellipse') throw unsupported(document, path, 'the kernel "ellipse"', show(kernel));
-  if (colorSpace !== 'srgb_rec709_display') {
-    throw unsupported(document, path, 'colours encoded as sRGB ("srgb_rec709_display")', show(colorSpace));
+const LINEAR = 'lin_rec709_display';
+
+/** Whether the colors of a primitive of splats are linear light. */
+export const hasLinearColors = (primitive: Json): boolean => splatsOf(primitive).colorSpace === LINEAR;
+
+/** Values that are drawn as they are meant; the first is taken for all others. */
+const KNOWN = {
+  kernel: ['ellipse'],
+  colorSpace: ['srgb_rec709_display', LINEAR],
+  projection: ['perspective'],
+  sortingMethod: ['cameraDistance'],
+} as const;
+
+/** Names values that other extensions define: a file that cannot do without these requires them, and is refused then. */
+function noteUnknown(cloud: DraftCloud, splats: Json): void {
+  for (const [property, known] of Object.entries(KNOWN)) {
+    const value = splats[property];
+    if (value !== undefined && !(known as readonly unknown[]).includes(value))
+      warn(cloud, `The ${property} ${show(value)} of splats is not known; "${known[0]}" is drawn in its place.`);
   }
 }
 
@@ -84,9 +125,9 @@ async function readCompressed(
   { bufferView }: Json,
   path: string,
   { budget, signal }: Pick<SceneSource, 'budget' | 'signal'>,
-): Promise<GaussianCloud> {
+): Promise<DraftCloud> {
   const bytes = await document.readView(bufferView);
-  const cloud = await readSpz({ bytes, name: `${document.name}, ${path}, SPZ`, budget, signal });
+  const cloud: DraftCloud = await readSpz({ bytes, name: `${document.name}, ${path}, SPZ`, budget, signal, isWithinGltf: true });
   transformCloud(cloud, SPZ_TO_GLTF);
   return cloud;
 }
@@ -96,7 +137,7 @@ async function readAttributes(
   primitive: Json,
   path: string,
   range: SplatRange | undefined,
-): Promise<GaussianCloud> {
+): Promise<DraftCloud> {
   const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
   // Drafts wrote _SCALE and _ROTATION.
   const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
@@ -117,32 +158,12 @@ async function readAttributes(
   const cloud = allocateCloud(count, degreeOf(own), document);
   cloud.positions.set(positions);
   cloud.scales.set(await read('SCALE', own('SCALE'), 3));
-  if (await areLogarithms(document, own('SCALE'), cloud.scales)) expInPlace(cloud.scales);
   const opacity = own('OPACITY');
   if (opacity !== undefined || attributes.COLOR_0 === undefined) cloud.opacities.set(await read('OPACITY', opacity, 1));
   else setAlphas(cloud, await read('COLOR_0', attributes.COLOR_0, 4));
   toWFirst(await read('ROTATION', own('ROTATION'), 4), cloud.rotations);
   await readColours(cloud, own, attributes, read);
   return cloud;
-}
-
-/**
- * splat-transform wrote scales as logarithms before June 2026: versions up to 2.3 always, later ones where an accessor has scales below 0, which the extension forbids.
- * Throws `decode/corrupt` for scales of other tools that are all below 0.
- */
-async function areLogarithms(document: GltfDocument, index: unknown, scales: Float32Array): Promise<boolean> {
-  const { asset } = document.json;
-  const generator = isObject(asset) && typeof asset.generator === 'string' ? asset.generator : '';
-  const [, major, minor] = /splat-transform v?(\d+)\.(\d+)/.exec(generator) ?? [];
-  if (major === undefined) {
-    if (scales.length > 0 && scales.every((scale) => scale < 0))
-      throw damaged(`${document.name}, SCALE`, 'scales of 0 or more', 'scales below 0 alone, as logarithms are');
-    return false;
-  }
-  if (Number(major) < 2 || (Number(major) === 2 && Number(minor) <= 3)) return true;
-  // All of them tell it, those too that were not asked for.
-  const { values } = await document.readAccessor(index);
-  return values.some((scale) => scale < 0);
 }
 
 function degreeOf(own: (name: string) => unknown): ShDegree {

@@ -52,6 +52,6 @@ export async function readCoarsest(
     throw error;
   }
   const cloud = keepUsable({ ...mergeClouds(parts, { budget, name }), levelRuns: levelRunsOf(parts) });
-  if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
+  if (cloud.count === 0) throw noSplats(name, cloud);
   return cloud;
 }

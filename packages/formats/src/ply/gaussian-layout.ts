@@ -10,6 +10,7 @@ export interface GaussianLayout {
   readonly vertex: PlyElement;
   /** Degree of the file's spherical harmonics. */
   readonly degree: ShDegree | 4;
+  readonly opacity: PlyProperty;
   /** Properties of the constant colour: SH coefficients, or plain colours to convert. */
   readonly colour: readonly PlyProperty[];
   readonly colourIsSh: boolean;
@@ -46,6 +47,7 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
   return {
     vertex,
     degree: shDegreeOf(source, vertex),
+    opacity: scalar('opacity')!,
     colour,
     colourIsSh,
     hasThirdScale,
@@ -118,8 +120,14 @@ export async function loadMeaning(
       ODD.test(name) || (/^(vertex|sh)$/.test(name) && properties.some((own) => !PLAIN.test(own.name))),
   );
   if (comments.length === 0 && !isOdd && !OFFSETS.test(fileName)) return undefined;
-  return loadModule('the code that reads what a PLY says of itself', () => import('./meaning.js'));
+  return importMeaning();
 }
+
+export const importMeaning = (): Promise<typeof meaning> =>
+  loadModule('the code that reads what a PLY says of itself', () => import('./meaning.js'));
+
+/** Element and property by which SHARP names the space of colors. */
+export const COLOR_SPACE = 'color_space';
 
 function notSplats(source: SceneSource, expected: string, found: string): GaussianSplatError {
   return new GaussianSplatError('decode/not-splats', {

@@ -106,6 +106,19 @@ export function noteLeftOut(cloud: DraftCloud, { elements }: PlyHeader, fileName
     );
 }
 
+/**
+ * Warns of numbers that look activated: trained scenes have negative logits, and splats of less than one unit.
+ * @param hasLargeScales whether no logarithm of a scale is below 0, too
+ */
+export function noteActivated(cloud: DraftCloud, hasLargeScales: boolean): void {
+  warn(
+    cloud,
+    hasLargeScales
+      ? 'No scale_* is below 0 and all opacities are in 0..1, as if both were activated already; they are read as logarithms and logits, so that splats are too large and too pale. If the picture is wrong, export the logarithms of scales and the logits of opacities.'
+      : 'All opacities are in 0..1, as if they were opacities already, which pixelSplat and MVSplat write; they are read as logits, so that all lie between 0.5 and 0.73. If the picture is wrong, export the logits.',
+  );
+}
+
 /** Kinds of splats that are no plain ones though their names may be the same: told by a name that no other kind has. */
 const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
   {

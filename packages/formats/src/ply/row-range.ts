@@ -4,7 +4,7 @@ import { readPly } from '../readers/ply.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { MAX_HEADER_BYTES } from '../signatures.js';
 import type { SplatRanges } from '../splat-ranges.js';
-import { findGaussians, withPlainNames } from './gaussian-layout.js';
+import { COLOR_SPACE, findGaussians, withPlainNames } from './gaussian-layout.js';
 import { exceedsFloat32, parsePlyHeader } from './header.js';
 import { openElement } from './rows.js';
 
@@ -12,6 +12,8 @@ import { openElement } from './rows.js';
 export function plyRanges(source: SceneSource): SplatRanges | undefined {
   const header = withPlainNames(parsePlyHeader(source));
   const { vertex, degree } = findGaussians(source, header);
+  // What it says stands behind all rows.
+  if (header.elements.some(({ name }) => name === COLOR_SPACE)) return undefined;
   const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
   const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && exceedsFloat32(type));
   if (rowBytes === undefined || rowBytes === 0 || isCoarse || start > MAX_HEADER_BYTES) return undefined;

@@ -1,8 +1,9 @@
-import { GaussianSplatError, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { openContainer, unknownExtensions, type Json } from '../gltf/container.js';
 import { GltfDocument } from '../gltf/document.js';
 import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
-import { isSplats, isUncompressed, readPrimitive, splatsIn } from '../gltf/primitive.js';
+import { activate, activationOf, isPlain, type Activation } from '../gltf/activation.js';
+import { hasLinearColors, isSplats, isUncompressed, readPrimitive, shapesIn, splatsIn } from '../gltf/primitive.js';
 import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
 import { warn } from '../faults.js';
@@ -30,9 +31,10 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   const { name, signal, range } = source;
   const { document, placed, others } = open(source);
   if (placed.length === 0) throw noSplats(document.json, name, others);
-  const clouds: GaussianCloud[] = [];
+  const found: (PlacedSplats & { readonly cloud: DraftCloud })[] = [];
   let splats = 0;
-  for (const { primitive, path, toScene } of placed) {
+  for (const one of placed) {
+    const { primitive, path } = one;
     signal?.throwIfAborted();
     const own = range && within(range, splats, splatsIn(document, primitive, path).count);
     if (own && own.end <= own.first) {
@@ -41,7 +43,17 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
     }
     const cloud = await readPrimitive(document, primitive, path, source, own);
     splats += own?.count ?? cloud.count;
-    clouds.push(moved(cloud, multiply(TO_CLOUD, toScene)));
+    found.push({ ...one, cloud });
+  }
+  const activation = range ? PLAIN : activationOf(document.json, openCloudsOf(found));
+  const clouds: GaussianCloud[] = [];
+  for (const { cloud, primitive, toScene } of found) {
+    signal?.throwIfAborted();
+    const isOpen = isUncompressed(primitive);
+    if (isOpen) activate(cloud, activation);
+    if (hasLinearColors(primitive)) await encodeColors(cloud);
+    const inScene = multiply(TO_CLOUD, toScene);
+    clouds.push(moved(cloud, isOpen && activation.isInPlyFrame ? multiply(inScene, TO_CLOUD) : inScene));
   }
   const whole =
     clouds.length === 1
@@ -53,6 +65,20 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   if (others > 0) whole.hints = { ...whole.hints, meshes: true };
   noteLeftOut(whole, document.json, others > 0);
   return whole;
+}
+
+/** Ranges are offered of documents as the extension has them: see {@link gltfSplats}. */
+const PLAIN: Activation = { hasLogarithms: false, hasLogits: false, isInPlyFrame: false };
+
+const openCloudsOf = (found: readonly (PlacedSplats & { readonly cloud: GaussianCloud })[]): GaussianCloud[] =>
+  found.filter(({ primitive }) => isUncompressed(primitive)).map(({ cloud }) => cloud);
+
+async function encodeColors(cloud: DraftCloud): Promise<void> {
+  const { encodeLinearColors } = await loadModule(
+    'the code that encodes linear colors',
+    () => import('../linear-colors.js'),
+  );
+  encodeLinearColors(cloud, 'lin_rec709_display');
 }
 
 /** Extensions that are named, at most. */
@@ -95,14 +121,16 @@ function middleOf({ positions, count }: GaussianCloud, axis: number): number {
   return sample.sort((a, b) => a - b)[sample.length >> 1] ?? 0;
 }
 
-/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, stand in another file, or lie so far that they have an origin of their own. */
-export function gltfSplats(source: SceneSource): { count: number; shDegree: ShDegree } | undefined {
+/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, stand in another file, have numbers of another meaning than the extension gives them, or lie so far that they have an origin of their own. */
+export async function gltfSplats(source: SceneSource): Promise<{ count: number; shDegree: ShDegree } | undefined> {
   const { document, placed } = open(source);
   if (
     document.hasFilesBeside ||
     !placed.every(({ primitive, toScene }) => isUncompressed(primitive) && !isFar(toScene))
   )
     return undefined;
+  const numbers = await Promise.all(placed.map(({ primitive, path }) => shapesIn(document, primitive, path)));
+  if (!isPlain(activationOf(document.json, numbers))) return undefined;
   const found = placed.map(({ primitive, path }) => splatsIn(document, primitive, path));
   const count = found.reduce((sum, own) => sum + own.count, 0);
   const shDegree = found.reduce<ShDegree>((most, own) => (own.shDegree > most ? own.shDegree : most), 0);

@@ -1,13 +1,15 @@
-import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { loadModule, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, sigmoidInPlace, type DraftCloud } from '../cloud.js';
 import {
+  COLOR_SPACE,
   findGaussians,
   harmonicTargets,
+  importMeaning,
   loadMeaning,
   withPlainNames,
   type GaussianLayout,
 } from '../ply/gaussian-layout.js';
-import { exceedsFloat32, parsePlyHeader, type PlyProperty } from '../ply/header.js';
+import { exceedsFloat32, parsePlyHeader, type PlyHeader, type PlyProperty } from '../ply/header.js';
 import { relativePositions } from '../ply/positions.js';
 import { openElement, readColumns, type ColumnTarget, type ElementData } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';
@@ -30,12 +32,43 @@ export async function readPly(source: SceneSource): Promise<GaussianCloud> {
   const filter = new Float32Array(layout.hasFilter ? cloud.count : 0);
   readAttributes(data, layout, cloud, filter);
   source.signal?.throwIfAborted();
+  const white = layout.opacity.type.startsWith('float') ? undefined : whiteOf(layout.opacity);
+  if (cloud.count >= LEAST_TESTED && white === undefined && isWithin(cloud.opacities, 0, 1)) {
+    const { noteActivated } = await importMeaning();
+    noteActivated(cloud, isWithin(cloud.scales, 0, Infinity));
+  }
   expInPlace(cloud.scales);
   if (!layout.hasThirdScale) flatten(cloud);
-  sigmoidInPlace(cloud.opacities);
+  if (white === undefined) sigmoidInPlace(cloud.opacities);
+  else for (let i = 0; i < cloud.count; i++) cloud.opacities[i] /= white;
   if (layout.hasFilter) meaning?.fuseFilter(cloud, filter);
   if (!layout.colourIsSh) convertPlainColours(cloud, layout.colour);
+  if (hasLinearColors(source, header)) {
+    const { encodeLinearColors } = await loadModule(
+      'the code that encodes linear colors',
+      () => import('../linear-colors.js'),
+    );
+    encodeLinearColors(cloud, 'color_space 1 of SHARP');
+  }
   return cloud;
+}
+
+/** Of fewer splats all logits may lie in 0..1. */
+const LEAST_TESTED = 50;
+
+/** Whether all values lie within bounds. Most arrays of logits or logarithms end this at the first few. */
+function isWithin(values: Float32Array, min: number, max: number): boolean {
+  for (let i = 0; i < values.length; i++) if (!(values[i] >= min && values[i] <= max)) return false;
+  return true;
+}
+
+/** SHARP writes its color space as an element of one row: 0 for sRGB, 1 for linear RGB. */
+function hasLinearColors(source: SceneSource, header: PlyHeader): boolean {
+  const space = header.elements.find(({ name }) => name === COLOR_SPACE);
+  if (space?.count !== 1 || source.isPrefix) return false;
+  const value = new Uint8Array(1);
+  readColumns(openElement(source, header, COLOR_SPACE), interleaved([COLOR_SPACE], value, 1));
+  return value[0] === 1;
 }
 
 function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftCloud, filter: Float32Array): void {
@@ -72,11 +105,14 @@ function flatten(cloud: DraftCloud): void {
   for (let i = 0; i < cloud.count; i++) cloud.scales[3 * i + 2] = 0;
 }
 
+/** The integer that stands for 1. */
+const whiteOf = ({ type }: Pick<PlyProperty, 'type'>): number => (type === 'uint16' ? 65_535 : 255);
+
 /** Turns colours 0..255 (integers; 16-bit ones 0..65535) or 0..1 (floats) into the constant SH coefficient. */
 function convertPlainColours(cloud: DraftCloud, colour: readonly PlyProperty[]): void {
   const stride = 3 * shCoefficientCount(cloud.shDegree);
   colour.forEach(({ type }, channel) => {
-    const white = type.startsWith('float') ? 1 : type === 'uint16' ? 65_535 : 255;
+    const white = type.startsWith('float') ? 1 : whiteOf({ type });
     for (let at = channel; at < cloud.sh.length; at += stride) cloud.sh[at] = (cloud.sh[at] / white - 0.5) / SH_C0;
   });
 }

@@ -1,5 +1,6 @@
 import { GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import { startsWith } from '../bytes.js';
+import { loadDetection, loadReader } from '../load-parts.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
 import { previewWanted, type SceneSource } from '../scene-format.js';
 import { Gunzip } from '../spz/gunzip.js';
@@ -21,24 +22,44 @@ import { unpackSplats } from '../spz/unpack.js';
 /**
  * Reads Niantic's SPZ: versions 1 to 3, which are gzip files (or their inflated content), and version 4, whose
  * attributes are zstd streams. Degree 4 of the spherical harmonics is left out. Extensions are skipped, save the one
- * that names the coordinate system; without it a file is in right-up-back and is turned into a cloud's frame.
+ * that names the coordinate system; without it the writer's marks decide: `assumedAxes`.
  */
 export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   if (source.isPrefix) return readWithoutHarmonics(source);
-  const { header, scene } = startsWith(source.bytes, 'NGSP') ? await readPlain(source) : await readGzip(source);
+  const found = startsWith(source.bytes, 'NGSP') ? await readPlain(source) : await readGzip(source);
+  if ('positions' in found) return found;
+  const { header, scene } = found;
   source.signal?.throwIfAborted();
-  if (previewWanted(source, header.count)) await source.onPreview?.(previewOf(header, scene, source));
-  return unpackSplats(header, scene, source);
+  if (previewWanted(source, header.count)) await source.onPreview?.(await previewOf(header, scene, source));
+  return unpackFrame(header, scene, source);
 }
 
+/** Unpacks all attributes into a cloud's frame. Few files have systems whose vertical axis is the third. */
+async function unpackFrame(header: SpzHeader, scene: PackedScene, source: SceneSource): Promise<GaussianCloud> {
+  const cloud = unpackSplats(header, scene, source);
+  if (scene.turn === undefined) return cloud;
+  const { transformCloud } = await loadModule(
+    'the code that turns splats',
+    () => import('../transform/transform-cloud.js'),
+  );
+  transformCloud(cloud, scene.turn);
+  return cloud;
+}
+
+/** The header, and what the file around it says of the frame: glTF names right-up-back. */
+const headerOf = ({ name, isWithinGltf }: SceneSource, start: Uint8Array): SpzHeader => ({
+  ...parseSpzHeader(start, name),
+  followsSpecification: isWithinGltf,
+});
+
 /** Every so many-th splat, without coefficients above the constant one. */
-function previewOf(header: SpzHeader, { attributes, axes }: PackedScene, source: SceneSource): GaussianCloud {
+async function previewOf(header: SpzHeader, { attributes, axes, turn }: PackedScene, source: SceneSource): Promise<GaussianCloud> {
   const sizes = bytesPerSplat(header.version, 0);
   const count = Math.ceil(header.count / PREVIEW_STEP);
   const taken = Object.fromEntries(
     SPZ_ATTRIBUTES.map((attribute) => [attribute, everyNth(attributes[attribute], sizes[attribute], count)]),
   ) as PackedScene['attributes'];
-  return sparse(unpackSplats({ ...header, count, degree: 0 }, { attributes: taken, axes }, source));
+  return sparse(await unpackFrame({ ...header, count, degree: 0 }, { attributes: taken, axes, turn }, source));
 }
 
 function everyNth(values: Uint8Array, size: number, count: number): Uint8Array {
@@ -53,17 +74,17 @@ function everyNth(values: Uint8Array, size: number, count: number): Uint8Array {
 async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud> {
   const { bytes, name } = source;
   if (startsWith(bytes, 'NGSP')) {
-    const header = parseSpzHeader(bytes, name);
+    const header = headerOf(source, bytes);
     if (header.version === 4) {
       const plain = { ...header, degree: 0 } as const;
       requirePlausibleCount(plain, bytes.length, name);
-      return unpackSplats(plain, (await loadStreams()).readStreams(source, header), source);
+      return unpackFrame(plain, (await loadStreams()).readStreams(source, header), source);
     }
     return unpackLegacy(source, bytes, header);
   }
   const gunzip = new Gunzip(source);
   try {
-    const header = parseSpzHeader(await gunzip.upTo(SPZ_HEADER_BYTES), name);
+    const header = headerOf(source, await gunzip.upTo(SPZ_HEADER_BYTES));
     const plain = { ...header, degree: 0 } as const;
     // More than the bytes so far can hold is not there yet, or never will be.
     requirePlausibleCount(plain, bytes.length, name);
@@ -74,10 +95,10 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
   }
 }
 
-function unpackLegacy(source: SceneSource, file: Uint8Array, header: SpzHeader): GaussianCloud {
+function unpackLegacy(source: SceneSource, file: Uint8Array, header: SpzHeader): Promise<GaussianCloud> {
   const plain = { ...header, degree: 0, hasExtensions: false } as const;
   const body = file.subarray(0, SPZ_HEADER_BYTES + bodyBytes(plain, header.version));
-  return unpackSplats(plain, readLegacyBody(body, plain, source.name), source);
+  return unpackFrame(plain, readLegacyBody(body, plain, source.name), source);
 }
 
 interface SpzParts {
@@ -91,14 +112,15 @@ const loadStreams = (): Promise<typeof streams> =>
 
 async function readPlain(source: SceneSource): Promise<SpzParts> {
   const { bytes, name } = source;
-  const header = parseSpzHeader(bytes, name);
+  const header = headerOf(source, bytes);
   requirePlausibleCount(header, bytes.length, name);
   const scene =
     header.version === 4 ? (await loadStreams()).readStreams(source, header) : readLegacyBody(bytes, header, name);
   return { header, scene };
 }
 
-async function readGzip(source: SceneSource): Promise<SpzParts> {
+/** The parts of an SPZ, or the splats of another scene inside the gzip file. */
+async function readGzip(source: SceneSource): Promise<SpzParts | GaussianCloud> {
   const { bytes, name } = source;
   const gunzip = new Gunzip(source);
   try {
@@ -106,8 +128,8 @@ async function readGzip(source: SceneSource): Promise<SpzParts> {
     if (start.length < SPZ_HEADER_BYTES && startsWith(start, 'NGSP')) {
       throw truncatedHeader(name, start.length, SPZ_HEADER_BYTES);
     }
-    if (!startsWith(start, 'NGSP')) throw await otherGzip(start, name);
-    const header = parseSpzHeader(start, name);
+    if (!startsWith(start, 'NGSP')) return await readInflated(source, start, gunzip);
+    const header = headerOf(source, start);
     if (header.version === 4) throw gzippedVersion4(name);
     requirePlausibleCount(header, bytes.length, name);
     const file = await gunzip.upTo(SPZ_HEADER_BYTES + longestBody(header));
@@ -115,6 +137,24 @@ async function readGzip(source: SceneSource): Promise<SpzParts> {
   } finally {
     gunzip.close();
   }
+}
+
+/** A scene that was compressed as a whole, as `scene.ply.gz`. */
+async function readInflated(source: SceneSource, start: Uint8Array, gunzip: Gunzip): Promise<GaussianCloud> {
+  const { findFormat } = await loadDetection();
+  const name = source.name.replace(/\.gz$/i, '');
+  const isOther = (bytes: Uint8Array): boolean => (findFormat(bytes, name, '')?.name ?? 'spz') !== 'spz';
+  // Whatever is no scene by its beginning is not inflated further.
+  if (!isOther(start)) throw await otherGzip(start, source.name);
+  let bytes = start;
+  for (let length = 0; bytes.length > length;) {
+    length = bytes.length;
+    bytes = await gunzip.upTo(2 * Math.max(length, SPZ_HEADER_BYTES));
+  }
+  const format = findFormat(bytes, name, '')!;
+  const read = await loadReader(format);
+  source.signal?.throwIfAborted();
+  return read({ ...source, bytes: bytes.slice(), name });
 }
 
 async function otherGzip(start: Uint8Array, name: string): Promise<GaussianSplatError> {

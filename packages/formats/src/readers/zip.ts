@@ -1,4 +1,5 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { asciiOf, viewOf } from '../bytes.js';
 import { findFormat } from '../detect.js';
 import { loadDiagnosis, loadReader } from '../load-parts.js';
 import { MAX_INDEX_BYTES } from '../lod/meta.js';
@@ -27,7 +28,7 @@ const ITERATION = /^(.*\/)?iteration_(\d+)\/point_cloud\.ply$/i;
 export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const { name } = source;
   const archive = new Archive(source);
-  const path = mainFile(archive, name);
+  const path = await mainFile(archive, name);
   if (path === undefined) throw await noSceneIn(archive, name);
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const inner = archive.open(path);
@@ -45,7 +46,7 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
 const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 
 /** Undefined where there is none. */
-function mainFile(archive: Archive, name: string): string | undefined {
+async function mainFile(archive: Archive, name: string): Promise<string | undefined> {
   const paths = relevant(archive.paths);
   for (const [description, most] of DESCRIPTIONS) {
     // Other programs have a meta.json, too.
@@ -58,20 +59,37 @@ function mainFile(archive: Archive, name: string): string | undefined {
   }
   const files = paths.filter((path) => SCENE_FILE.test(path));
   const trained = files.filter((path) => !FIRST_POINTS.test(path));
-  const scenes = shallowest(trained.length > 0 ? trained : files);
+  const scenes = withoutMeshes(shallowest(trained.length > 0 ? trained : files), archive);
   if (scenes.length === 1) return scenes[0];
   const last = lastIteration(scenes);
   if (last !== undefined) return last;
   // glTF names its other files, scenes among them.
   const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
   if (gltf.length === 1) return gltf[0];
-  if (scenes.length > 0) throw severalScenes(name, scenes);
+  if (scenes.length > 0) throw (await namedArchive(archive, name)) ?? severalScenes(name, scenes);
   return undefined;
 }
 
-async function noSceneIn({ paths }: Archive, name: string): Promise<GaussianSplatError> {
+/** Of several scenes, those that are no GLB of meshes alone; all of them where nothing else is left. */
+function withoutMeshes(scenes: readonly string[], archive: Archive): readonly string[] {
+  if (scenes.length < 2) return scenes;
+  const hasSplats = (path: string): boolean => {
+    const bytes = archive.open(path);
+    return asciiOf(bytes, 20, 20 + viewOf(bytes).getUint32(12, true)).includes('KHR_gaussian_splatting');
+  };
+  const left = scenes.filter((path) => !/\.glb$/i.test(path) || archive.lengthOf(path) < 20 || hasSplats(path));
+  return left.length > 0 ? left : scenes;
+}
+
+/** The error for an archive that is known for a path in it. */
+async function namedArchive({ paths }: Archive, name: string): Promise<GaussianSplatError | undefined> {
   const { diagnoseArchive } = await loadDiagnosis();
-  return diagnoseArchive(paths, name) ?? noScene(name, undefined, `a ZIP archive with ${listed(relevant(paths))}`);
+  return diagnoseArchive(paths, name);
+}
+
+async function noSceneIn(archive: Archive, name: string): Promise<GaussianSplatError> {
+  const found = `a ZIP archive with ${listed(relevant(archive.paths))}`;
+  return (await namedArchive(archive, name)) ?? noScene(name, undefined, found);
 }
 
 /** Of the same scene after some numbers of iterations, the one after most; undefined for others. */

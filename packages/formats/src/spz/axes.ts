@@ -1,47 +1,84 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
+import type { SpzHeader } from './header.js';
 
 /** Factor, 1 or -1, of each axis of a file on its way into a cloud's frame (x right, y down, z forward). */
 export type AxisSigns = readonly [x: 1 | -1, y: 1 | -1, z: 1 | -1];
 
-/** x right, y up, z back: the frame of SPZ files that do not name another. */
+/** x right, y up, z back: the frame that the specification names, and that Scaniverse and older tools write. */
 export const RIGHT_UP_BACK: AxisSigns = [1, -1, -1];
+/** x right, y down, z forward: the frame of PLY, which current converters keep. */
+export const RIGHT_DOWN_FORWARD: AxisSigns = [1, 1, 1];
 
 /** Adobe's record of the frame a file is in, one of 16 in the numbering of SPZ's `CoordinateSystem`. */
 const COORDINATE_SYSTEM = 0xadbe0003;
-/** Padding; and Adobe's record of where cameras may go, which changes no splat. */
+/** Padding; and Adobe's limits of an orbiting camera, which change no splat. */
 const MEANINGLESS = new Set([0, 0xadbe0002]);
 const MOST_SKIPPED = 8;
+/** Bits after the point that all converters write. */
+const USUAL_FRACTIONAL_BITS = 12;
+
+/** The frame of a file: signs of its axes and, for systems whose third axis is vertical, the map [3, 4] that is applied afterwards. */
+export interface SpzFrame {
+  readonly axes: AxisSigns;
+  readonly turn?: readonly number[] | undefined;
+  /** The file names no frame. */
+  readonly isAssumed?: boolean | undefined;
+}
 
 /**
- * Finds the frame that extension records name: `[uint32 type][uint32 length][payload]`, one after another. Records of
- * other types are skipped, and listed. Systems 1 to 8 differ from ours in signs only, bit 0 of (system - 1) meaning right, bit 1
- * up and bit 2 forward; the rest swap axes, which `decode/unsupported` says.
+ * The frame of a file that names none, by its writer's marks. Version 1, and version 2 with antialiasing, come from Niantic's own apps; other numbers of fractional bits than 12
+ * come from tools that follow the specification. All of these are in right-up-back. Current converters keep the frame of PLY: docs/decisions/0022-the-frame-of-spz.md.
  */
-export function readExtensions(records: Uint8Array, name: string): { axes: AxisSigns; skipped: readonly number[] } {
+export function assumedAxes(header: SpzHeader): AxisSigns {
+  const { version, antialiased, fractionalBits, followsSpecification } = header;
+  const isRightUpBack =
+    followsSpecification ||
+    version === 1 ||
+    (version === 2 && antialiased) ||
+    fractionalBits !== USUAL_FRACTIONAL_BITS;
+  return isRightUpBack ? RIGHT_UP_BACK : RIGHT_DOWN_FORWARD;
+}
+
+/**
+ * Finds the frame that extension records name: `[uint32 type][uint32 length][payload]`, one after another; without one, {@link assumedAxes}. Records of
+ * other types are skipped, and listed.
+ */
+export function readExtensions(
+  records: Uint8Array,
+  header: SpzHeader,
+  name: string,
+): SpzFrame & { skipped: readonly number[] } {
   const view = viewOf(records);
   const skipped = new Set<number>();
-  let axes: AxisSigns | undefined;
+  let frame: SpzFrame | undefined;
   for (let at = 0; at + 8 <= records.length;) {
     const type = view.getUint32(at, true);
     const length = view.getUint32(at + 4, true);
     if (at + 8 + length > records.length) break;
-    if (type === COORDINATE_SYSTEM && length >= 4) axes ??= axesOfSystem(view.getUint32(at + 8, true), name);
+    if (type === COORDINATE_SYSTEM && length >= 4) frame ??= frameOfSystem(view.getUint32(at + 8, true), name);
     else if (!MEANINGLESS.has(type) && skipped.size < MOST_SKIPPED) skipped.add(type);
     at += 8 + length;
   }
-  return { axes: axes ?? RIGHT_UP_BACK, skipped: [...skipped] };
+  return { ...(frame ?? { axes: assumedAxes(header), isAssumed: !header.followsSpecification }), skipped: [...skipped] };
 }
 
-function axesOfSystem(system: number, name: string): AxisSigns {
-  if (system === 0) return RIGHT_UP_BACK;
-  if (system <= 8) {
-    const bits = system - 1;
-    return [bits & 1 ? 1 : -1, bits & 2 ? -1 : 1, bits & 4 ? 1 : -1];
+/**
+ * Of systems 1 to 8, bit 0 of (system - 1) means right, bit 1 up and bit 2 forward. Systems 9 to 16 list the second axis of depth before the vertical one:
+ * bit 0 of (system - 9) means right, bit 1 up and bit 2 back. System 0 is unspecified.
+ */
+function frameOfSystem(system: number, name: string): SpzFrame | undefined {
+  if (system === 0) return undefined;
+  const bits = (system - 1) & 7;
+  const right = bits & 1 ? 1 : -1;
+  const down = bits & 2 ? -1 : 1;
+  if (system <= 8) return { axes: [right, down, bits & 4 ? 1 : -1] };
+  if (system <= 16) {
+    return { axes: [1, 1, 1], turn: [right, 0, 0, 0, 0, 0, down, 0, 0, bits & 4 ? -1 : 1, 0, 0] };
   }
   throw new GaussianSplatError('decode/unsupported', {
     where: `${name}, SPZ extension 0xADBE0003 (coordinate system)`,
-    expected: 'a system from 0 to 8, whose second axis is vertical',
+    expected: 'a system from 0 to 16',
     found: String(system),
     remedy: 'export the scene again in the right-up-back (RUB) system, which is the default of SPZ',
   });

@@ -11,6 +11,8 @@ export interface SpzHeader {
   readonly fractionalBits: number;
   readonly antialiased: boolean;
   readonly hasExtensions: boolean;
+  /** The file is known to be in the frame of the specification unless it names another. */
+  readonly followsSpecification?: boolean | undefined;
 }
 
 /** The attributes in the order of the file. */

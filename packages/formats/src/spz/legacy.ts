@@ -43,7 +43,7 @@ export function readLegacyBody(file: Uint8Array, header: SpzHeader, name: string
     attributes[attribute] = file.subarray(at, end);
     at = end;
   }
-  return { attributes, ...readExtensions(header.hasExtensions ? file.subarray(at) : new Uint8Array(0), name) };
+  return { attributes, ...readExtensions(header.hasExtensions ? file.subarray(at) : new Uint8Array(0), header, name) };
 }
 
 /** True of what may stand behind a body: zeros, or fewer bytes than another version would have there. */

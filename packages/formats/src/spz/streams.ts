@@ -3,13 +3,12 @@ import { grouped, viewOf } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
 import { ZstdError } from '../zstd/bits.js';
 import { decompressZstd } from '../zstd/decompress.js';
-import { readExtensions, type AxisSigns } from './axes.js';
+import { readExtensions, type SpzFrame } from './axes.js';
 import { bytesPerSplat, SPZ_ATTRIBUTES, truncatedHeader, type SpzAttribute, type SpzHeader } from './header.js';
 
 /** The packed attributes of all splats, and the frame that they are in. */
-export interface PackedScene {
+export interface PackedScene extends SpzFrame {
   readonly attributes: Readonly<Record<SpzAttribute, Uint8Array>>;
-  readonly axes: AxisSigns;
   /** Types of extensions that are not known. */
   readonly skipped?: readonly number[];
 }
@@ -53,7 +52,7 @@ export function readStreams(source: SceneSource, header: SpzHeader): PackedScene
     at += compressed;
   });
   const records = header.hasExtensions ? bytes.subarray(HEADER_BYTES, tableStart) : new Uint8Array(0);
-  return { attributes, ...readExtensions(records, name) };
+  return { attributes, ...readExtensions(records, header, name) };
 }
 
 function inflate(stream: Uint8Array, length: number, attribute: string, at: number, name: string): Uint8Array {

@@ -1,0 +1,41 @@
+/** Colors that a file gives as linear light. */
+import { shCoefficientCount } from '@gaussian-splat/core';
+import { SH_C0, type DraftCloud } from './cloud.js';
+import { warn } from './faults.js';
+
+/** The sRGB transfer function, continued to negative values as an odd function. */
+function encoded(linear: number): number {
+  const size = Math.abs(linear);
+  const value = size <= 0.0031308 ? 12.92 * size : 1.055 * size ** (1 / 2.4) - 0.055;
+  return linear < 0 ? -value : value;
+}
+
+/** A deviation below this has the slope of the curve itself. */
+const LEAST_DEVIATION = 1e-4;
+
+/**
+ * Encodes linear colors as sRGB, in place. The mean color of a splat is exact; its change with direction is multiplied by the slope of the curve over the standard
+ * deviation of that change. Blending encoded colors in place of linear ones is an approximation, which the cloud's warning says.
+ */
+export function encodeLinearColors(cloud: DraftCloud, source: string): void {
+  const { count, sh, shDegree } = cloud;
+  const stride = 3 * shCoefficientCount(shDegree);
+  for (let i = 0; i < count; i++) {
+    for (let channel = 0; channel < 3; channel++) {
+      const at = stride * i + channel;
+      const linear = 0.5 + SH_C0 * sh[at];
+      let squares = 0;
+      for (let k = 3; k < stride; k += 3) squares += sh[at + k] ** 2;
+      sh[at] = (encoded(linear) - 0.5) / SH_C0;
+      if (squares === 0) continue;
+      // Basis functions are orthonormal: the mean of the square over all directions is the sum of squares by 4π.
+      const deviation = Math.max(LEAST_DEVIATION, Math.sqrt(squares / (4 * Math.PI)));
+      const slope = (encoded(linear + deviation) - encoded(linear - deviation)) / (2 * deviation);
+      for (let k = 3; k < stride; k += 3) sh[at + k] *= slope;
+    }
+  }
+  warn(
+    cloud,
+    `Colors are linear (${source}). They are encoded as sRGB before splats are blended, so that blended edges are slightly darker than with linear blending.`,
+  );
+}
