@@ -172,9 +172,8 @@ for (const [folder, cases] of [
     const files = readdirSync(path).filter((file) => SCENE.test(file));
     assert.ok(files.length >= 12, `${files.length} files`);
     for (const file of files) {
-      const found = await readScene(readFileSync(`${path}/${file}`), { name: file }).then(
-        describe,
-        (error: unknown) => (error instanceof GaussianSplatError ? `${error.code} ${error.message}` : String(error)),
+      const found = await readScene(readFileSync(`${path}/${file}`), { name: file }).then(describe, (error: unknown) =>
+        error instanceof GaussianSplatError ? `${error.code} ${error.message}` : String(error),
       );
       context.diagnostic(`${file}: ${found}`);
       // What comes later must at least be told.
@@ -199,7 +198,8 @@ test('what tools made of one scene has the numbers of its source', { skip: needs
     const cloud = await read(file);
     assertAtMost(largestDifference(cloud.opacities, gltf.opacities), 1e-6, `${file}, opacities`);
     assertAtMost(largestDifference(cloud.positions, right.positions), 1e-6, `${file}, positions`);
-    if (file !== 'khr-log-mixed.glb') assertAtMost(largestDifference(cloud.scales, gltf.scales), 1e-6, `${file}, scales`);
+    if (file !== 'khr-log-mixed.glb')
+      assertAtMost(largestDifference(cloud.scales, gltf.scales), 1e-6, `${file}, scales`);
   }
   // gsbox sorts splats.
   const gsbox = await read('glb-gsbox-4.8.4.glb');

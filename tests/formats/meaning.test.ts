@@ -190,13 +190,35 @@ test('a PLY with numbers that look activated says so, and only such a one', asyn
   const inside = opacitiesOf('float', 60, (i) => (i % 11) / 10);
   assert.match(await warningsOf(sharpLike(inside, -3)), /All opacities are in 0..1/);
   assert.match(await warningsOf(sharpLike(inside, 0.1)), /No scale_\* is below 0 and all opacities/);
-  assert.equal(await warningsOf(sharpLike(opacitiesOf('float', 60, (i) => (i % 11) / 10 - 0.1), 0.1)), '');
+  assert.equal(
+    await warningsOf(
+      sharpLike(
+        opacitiesOf('float', 60, (i) => (i % 11) / 10 - 0.1),
+        0.1,
+      ),
+    ),
+    '',
+  );
   // Of so few, all may be so by chance.
-  assert.equal(await warningsOf(sharpLike(opacitiesOf('float', 20, () => 0.5), 0.1, { count: 20 })), '');
+  assert.equal(
+    await warningsOf(
+      sharpLike(
+        opacitiesOf('float', 20, () => 0.5),
+        0.1,
+        { count: 20 },
+      ),
+    ),
+    '',
+  );
 });
 
 test('opacities of a PLY that are integers are shares of the largest', async () => {
-  const { opacities, warnings } = await readScene(sharpLike(opacitiesOf('uchar', 60, (i) => 4 * i), -3));
+  const { opacities, warnings } = await readScene(
+    sharpLike(
+      opacitiesOf('uchar', 60, (i) => 4 * i),
+      -3,
+    ),
+  );
   opacities.forEach((opacity, i) => assert.ok(Math.abs(opacity - (4 * i) / 255) < 1e-6));
   assert.equal(warnings, undefined);
 });

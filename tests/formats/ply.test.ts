@@ -259,7 +259,11 @@ test('an empty scene is refused', async () => {
   const columns = inriaColumns(rawSplats(0, 0));
   await expectRefusal(writePly([{ name: 'vertex', columns }]), 'decode/empty', /found 0 splats/);
   const dead = inriaColumns(rawSplats(3, 0)).map((c) => (c.name === 'x' ? { ...c, values: [NaN, NaN, NaN] } : c));
-  await expectRefusal(writePly([{ name: 'vertex', columns: dead }]), 'decode/empty', /3 splats that cannot be drawn: 3 with values that are not finite/);
+  await expectRefusal(
+    writePly([{ name: 'vertex', columns: dead }]),
+    'decode/empty',
+    /3 splats that cannot be drawn: 3 with values that are not finite/,
+  );
 });
 
 test("Mip-Splatting's filter is part of what is drawn", async () => {

@@ -29,11 +29,15 @@ test('SPZ of current tools stand as the PLY that they were made of', { skip: nee
   }
 });
 
-test('of one scene by two versions of splat-transform, the header does not say the frame', { skip: needsSharedData }, async () => {
-  const [{ all: old }, { all: later }] = await Promise.all(
-    ['2.7.1', '3.7.0'].map((version) => heightsIn(sharedPath(`../cases/formats/spz-splat-transform-${version}.spz`))),
-  );
-  // The earlier one is upside down: y is mirrored.
-  old.forEach((y, i) => assert.ok(Math.abs(y + later[i]) < 1e-3, `${y} and ${later[i]}`));
-  assert.ok(old.some((y) => Math.abs(y) > 0.5));
-});
+test(
+  'of one scene by two versions of splat-transform, the header does not say the frame',
+  { skip: needsSharedData },
+  async () => {
+    const [{ all: old }, { all: later }] = await Promise.all(
+      ['2.7.1', '3.7.0'].map((version) => heightsIn(sharedPath(`../cases/formats/spz-splat-transform-${version}.spz`))),
+    );
+    // The earlier one is upside down: y is mirrored.
+    old.forEach((y, i) => assert.ok(Math.abs(y + later[i]) < 1e-3, `${y} and ${later[i]}`));
+    assert.ok(old.some((y) => Math.abs(y) > 0.5));
+  },
+);

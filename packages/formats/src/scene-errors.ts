@@ -25,9 +25,7 @@ export function noSplats(name: string, { droppedCount, faults = [] }: GaussianCl
     where: name,
     expected: '1 splat or more that can be drawn',
     found:
-      droppedCount === 0
-        ? '0 splats'
-        : `${grouped(droppedCount)} splats that cannot be drawn: ${reasonsOf(faults)}`,
+      droppedCount === 0 ? '0 splats' : `${grouped(droppedCount)} splats that cannot be drawn: ${reasonsOf(faults)}`,
     remedy:
       faults[0] > 0
         ? 'export the scene again with scales that are 0 or more, not their logarithms'

@@ -127,7 +127,13 @@ async function readCompressed(
   { budget, signal }: Pick<SceneSource, 'budget' | 'signal'>,
 ): Promise<DraftCloud> {
   const bytes = await document.readView(bufferView);
-  const cloud: DraftCloud = await readSpz({ bytes, name: `${document.name}, ${path}, SPZ`, budget, signal, isWithinGltf: true });
+  const cloud: DraftCloud = await readSpz({
+    bytes,
+    name: `${document.name}, ${path}, SPZ`,
+    budget,
+    signal,
+    isWithinGltf: true,
+  });
   transformCloud(cloud, SPZ_TO_GLTF);
   return cloud;
 }

@@ -53,7 +53,11 @@ const headerOf = ({ name, isWithinGltf }: SceneSource, start: Uint8Array): SpzHe
 });
 
 /** Every so many-th splat, without coefficients above the constant one. */
-async function previewOf(header: SpzHeader, { attributes, axes, turn }: PackedScene, source: SceneSource): Promise<GaussianCloud> {
+async function previewOf(
+  header: SpzHeader,
+  { attributes, axes, turn }: PackedScene,
+  source: SceneSource,
+): Promise<GaussianCloud> {
   const sizes = bytesPerSplat(header.version, 0);
   const count = Math.ceil(header.count / PREVIEW_STEP);
   const taken = Object.fromEntries(

@@ -33,10 +33,7 @@ export interface SpzFrame {
 export function assumedAxes(header: SpzHeader): AxisSigns {
   const { version, antialiased, fractionalBits, followsSpecification } = header;
   const isRightUpBack =
-    followsSpecification ||
-    version === 1 ||
-    (version === 2 && antialiased) ||
-    fractionalBits !== USUAL_FRACTIONAL_BITS;
+    followsSpecification || version === 1 || (version === 2 && antialiased) || fractionalBits !== USUAL_FRACTIONAL_BITS;
   return isRightUpBack ? RIGHT_UP_BACK : RIGHT_DOWN_FORWARD;
 }
 
@@ -60,7 +57,10 @@ export function readExtensions(
     else if (!MEANINGLESS.has(type) && skipped.size < MOST_SKIPPED) skipped.add(type);
     at += 8 + length;
   }
-  return { ...(frame ?? { axes: assumedAxes(header), isAssumed: !header.followsSpecification }), skipped: [...skipped] };
+  return {
+    ...(frame ?? { axes: assumedAxes(header), isAssumed: !header.followsSpecification }),
+    skipped: [...skipped],
+  };
 }
 
 /**
