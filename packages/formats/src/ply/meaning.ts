@@ -114,8 +114,8 @@ export function noteActivated(cloud: DraftCloud, hasLargeScales: boolean): void 
   warn(
     cloud,
     hasLargeScales
-      ? 'No scale_* is below 0 and all opacities are in 0..1, as if both were activated already; they are read as logarithms and logits, so that splats are too large and too pale. If the picture is wrong, export the logarithms of scales and the logits of opacities.'
-      : 'All opacities are in 0..1, as if they were opacities already, which pixelSplat and MVSplat write; they are read as logits, so that all lie between 0.5 and 0.73. If the picture is wrong, export the logits.',
+      ? 'No scale_* is below 0 and all opacities are in 0..1, as if both were activated already; they are read as logarithms and logits, so that splats are too large and too pale. If the frame is wrong, export the logarithms of scales and the logits of opacities.'
+      : 'All opacities are in 0..1, as if they were opacities already, which pixelSplat and MVSplat write; they are read as logits, so that all lie between 0.5 and 0.73. If the frame is wrong, export the logits.',
   );
 }
 
