@@ -1,0 +1,242 @@
+import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { extinctionOf, type ExtinctionGrid, type GridOptions } from './extinction.js';
+import { solidsOf } from './solids.js';
+import type { WalkMap } from './walk-map.js';
+
+export interface FloorOptions extends GridOptions {
+  /** Free height that a body needs above the floor, meters; default 1.6. */
+  readonly height?: number;
+  /** Radius of a body, meters; default 0.2. */
+  readonly radius?: number;
+  /** Largest step up or down, meters; default 0.3. */
+  readonly step?: number;
+  /** Point, meters and y up, near which the walk starts: the largest floor below it is taken. Default: above the middle of the scene. */
+  readonly near?: Vector3;
+}
+
+/** Gaps of the floor of at most this width are bridged, meters. */
+const BRIDGE = 0.3;
+/** A floor belongs to the start if it comes this near to it, meters. */
+const REACH = 3;
+
+/**
+ * Finds the floor of a scene on which a person can walk, from its splats alone: solid voxels with free height above them, joined by a flood fill of places
+ * that hold a body. Of all floors that come near the start it takes the largest.
+ * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite.
+ */
+export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMap {
+  const grid = extinctionOf(cloud, options);
+  return floorOf(grid, solidsOf(grid), options);
+}
+
+/** The same from a grid of solid voxels, [nz, ny, nx], 1 for solid. */
+export function floorOf(grid: ExtinctionGrid, solid: Uint8Array, options: Omit<FloorOptions, 'frame'> = {}): WalkMap {
+  const body: Body = { height: 1.6, radius: 0.2, step: 0.3, ...options };
+  const { corner, size, voxel } = grid;
+  const middle = [0, 2].map((axis) => corner[axis] + (size[axis] * voxel) / 2);
+  const near: Vector3 = options.near ?? [middle[0], Infinity, middle[1]];
+  return new FloorFinder(grid, solid, body).find(near);
+}
+
+interface Body {
+  readonly height: number;
+  readonly radius: number;
+  readonly step: number;
+}
+
+/** One connected floor. */
+interface Region {
+  readonly cells: readonly number[];
+  readonly heights: readonly number[];
+  /** Index of the cell nearest to the start, and its distance in meters. */
+  readonly nearest: number;
+  readonly distance: number;
+}
+
+class FloorFinder {
+  readonly #grid: ExtinctionGrid;
+  readonly #solid: Uint8Array;
+  readonly #body: Body;
+  /** Heights of all surfaces with free height above, by column. */
+  readonly #floors: readonly (readonly number[])[];
+  /** Heights that belong to a region, by column. */
+  readonly #seen: number[][];
+  readonly #disc: readonly (readonly [x: number, z: number])[];
+
+  constructor(grid: ExtinctionGrid, solid: Uint8Array, body: Body) {
+    this.#grid = grid;
+    this.#solid = solid;
+    this.#body = body;
+    const [nx, , nz] = grid.size;
+    this.#floors = Array.from({ length: nx * nz }, (_, c) => this.#floorsOf(c % nx, Math.floor(c / nx)));
+    this.#seen = this.#floors.map(() => []);
+    this.#disc = discOf(Math.ceil(body.radius / grid.voxel));
+  }
+
+  find(near: Vector3): WalkMap {
+    const [nx] = this.#grid.size;
+    let best: Region | undefined;
+    this.#floors.forEach((heights, c) => {
+      for (const height of heights) {
+        const [x, z] = [c % nx, Math.floor(c / nx)];
+        if (height > near[1] || this.#isSeen(c, height) || this.#isBlocked(x, z, height)) continue;
+        const region = this.#fill(c, height, near);
+        const isLarger = !best || region.cells.length > best.cells.length;
+        const isReached = region.distance <= REACH || near[1] === Infinity;
+        if (isReached && isLarger) best = region;
+      }
+    });
+    return this.#mapOf(best ?? { cells: [], heights: [], nearest: 0, distance: 0 });
+  }
+
+  /** Heights of the floors of a column, from the top down. The surface lies where extinction peaks, found by a parabola through three voxels. */
+  #floorsOf(x: number, z: number): number[] {
+    const { values, size, corner, voxel } = this.#grid;
+    const [nx, ny] = size;
+    const needed = Math.ceil(this.#body.height / voxel);
+    const column = x + nx * ny * z;
+    const heights: number[] = [];
+    for (let y = ny - 2, free = needed; y >= 0; y--) {
+      if (this.#solid[column + nx * y] === 0) {
+        free++;
+        continue;
+      }
+      if (free >= needed) {
+        let peak = y;
+        for (let below = y - 1; below >= Math.max(1, y - 2) && this.#solid[column + nx * below] === 1; below--)
+          if (values[column + nx * below] > values[column + nx * peak]) peak = below;
+        const at = column + nx * peak;
+        const [under, here, over] = [values[at - nx] ?? 0, values[at], values[at + nx]];
+        const bend = under - 2 * here + over;
+        const shift = bend < 0 ? Math.min(0.5, Math.max(-0.5, (under - over) / (2 * bend))) : 0;
+        heights.push(corner[1] + voxel * (peak + 0.5 + shift));
+      }
+      free = 0;
+    }
+    return heights;
+  }
+
+  #near(c: number, y: number): number | undefined {
+    return this.#floors[c].find((height) => Math.abs(height - y) <= this.#body.step);
+  }
+
+  #isSeen(c: number, height: number): boolean {
+    return this.#seen[c].some((seen) => Math.abs(seen - height) <= this.#body.step / 2);
+  }
+
+  /** Height between floors on two opposite sides of a gap; undefined if there are none. */
+  #bridged(x: number, z: number, y: number): number | undefined {
+    const gap = Math.ceil(BRIDGE / this.#grid.voxel);
+    for (const [dx, dz] of DIRECTIONS) {
+      const before = this.#firstFloor(x, z, -dx, -dz, y, gap);
+      const after = before === undefined ? undefined : this.#firstFloor(x, z, dx, dz, y, gap);
+      if (before !== undefined && after !== undefined) return (before + after) / 2;
+    }
+    return undefined;
+  }
+
+  #firstFloor(x: number, z: number, dx: number, dz: number, y: number, gap: number): number | undefined {
+    const [nx, , nz] = this.#grid.size;
+    for (let k = 1; k <= gap; k++) {
+      const [i, j] = [x + k * dx, z + k * dz];
+      if (i < 0 || j < 0 || i >= nx || j >= nz) return undefined;
+      const height = this.#near(i + nx * j, y);
+      if (height !== undefined) return height;
+    }
+    return undefined;
+  }
+
+  /** Whether something solid is in the way of a body between the height of a step and its own. */
+  #isBlocked(x: number, z: number, y: number): boolean {
+    const { size, corner, voxel } = this.#grid;
+    const [nx, ny, nz] = size;
+    const low = Math.max(0, Math.ceil((y + this.#body.step - corner[1]) / voxel));
+    const high = Math.min(ny - 1, Math.floor((y + this.#body.height - corner[1]) / voxel));
+    for (const [dx, dz] of this.#disc) {
+      const [i, j] = [x + dx, z + dz];
+      if (i < 0 || j < 0 || i >= nx || j >= nz) continue;
+      for (let k = low; k <= high; k++) if (this.#solid[i + nx * (k + ny * j)] === 1) return true;
+    }
+    return false;
+  }
+
+  /** All that can be reached from a height of a column. */
+  #fill(start: number, height: number, near: Vector3): Region {
+    const { size, corner, voxel } = this.#grid;
+    const [nx, , nz] = size;
+    const [nearX, nearZ] = [(near[0] - corner[0]) / voxel, (near[2] - corner[2]) / voxel];
+    const cells = [start];
+    const heights = [height];
+    this.#seen[start].push(height);
+    let [nearest, shortest] = [0, Infinity];
+    for (const open = [0]; open.length > 0;) {
+      const index = open.pop()!;
+      const [c, y] = [cells[index], heights[index]];
+      const [x, z] = [c % nx, Math.floor(c / nx)];
+      const distance = Math.hypot(x + 0.5 - nearX, z + 0.5 - nearZ);
+      if (distance < shortest) [shortest, nearest] = [distance, index];
+      for (const [dx, dz] of SIDES) {
+        const [i, j] = [x + dx, z + dz];
+        if (i < 0 || j < 0 || i >= nx || j >= nz) continue;
+        const next = i + nx * j;
+        const reached = this.#near(next, y) ?? this.#bridged(i, j, y);
+        if (reached === undefined || this.#isSeen(next, reached) || this.#isBlocked(i, j, reached)) continue;
+        this.#seen[next].push(reached);
+        open.push(cells.length);
+        cells.push(next);
+        heights.push(reached);
+      }
+    }
+    return { cells, heights, nearest, distance: shortest * voxel };
+  }
+
+  /** The region alone, cut to its own rectangle. */
+  #mapOf({ cells, heights, nearest }: Region): WalkMap {
+    const { size, corner, voxel } = this.#grid;
+    const [nx] = size;
+    let [x0, x1, z0, z1] = [Infinity, -1, Infinity, -1];
+    for (const c of cells) {
+      const [x, z] = [c % nx, Math.floor(c / nx)];
+      [x0, x1, z0, z1] = [Math.min(x0, x), Math.max(x1, x), Math.min(z0, z), Math.max(z1, z)];
+    }
+    const isEmpty = cells.length === 0;
+    const [width, depth] = isEmpty ? [0, 0] : [x1 - x0 + 1, z1 - z0 + 1];
+    const origin: readonly [number, number] = isEmpty
+      ? [corner[0], corner[2]]
+      : [corner[0] + x0 * voxel, corner[2] + z0 * voxel];
+    const layers: Float32Array[] = [];
+    cells.forEach((c, index) => {
+      const at = (c % nx) - x0 + width * (Math.floor(c / nx) - z0);
+      let layer = 0;
+      while (layers[layer] !== undefined && !Number.isNaN(layers[layer][at])) layer++;
+      layers[layer] ??= new Float32Array(width * depth).fill(NaN);
+      layers[layer][at] = heights[index];
+    });
+    const area = cells.length * voxel * voxel;
+    const c = cells[nearest] ?? 0;
+    const start: Vector3 = isEmpty
+      ? [corner[0], corner[1], corner[2]]
+      : [corner[0] + ((c % nx) + 0.5) * voxel, heights[nearest], corner[2] + (Math.floor(c / nx) + 0.5) * voxel];
+    return { cell: voxel, corner: origin, width, depth, layers, step: this.#body.step, start, area };
+  }
+}
+
+const SIDES = [
+  [1, 0],
+  [-1, 0],
+  [0, 1],
+  [0, -1],
+] as const;
+const DIRECTIONS = [
+  [1, 0],
+  [0, 1],
+  [1, 1],
+  [1, -1],
+] as const;
+
+function discOf(radius: number): (readonly [number, number])[] {
+  const side = Array.from({ length: 2 * radius + 1 }, (_, i) => i - radius);
+  return side.flatMap((z) =>
+    side.flatMap((x): [number, number][] => (x * x + z * z <= radius * radius ? [[x, z]] : [])),
+  );
+}

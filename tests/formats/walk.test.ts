@@ -1,0 +1,211 @@
+import assert from 'node:assert/strict';
+import { existsSync, readFileSync } from 'node:fs';
+import { test } from 'node:test';
+import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import {
+  decodeWalkMap,
+  encodeWalkMap,
+  floorAt,
+  makeWalkMap,
+  stepOn,
+  wayTo,
+  type FloorOptions,
+  type WalkMap,
+} from '@gaussian-splat/formats/walk';
+
+/** Splats on surfaces of boxes, y down as trainers write them, meters; walkable space is known exactly. */
+interface Box {
+  readonly min: Vector3;
+  readonly max: Vector3;
+}
+
+const SPACING = 0.06;
+const FRAME: FloorOptions['frame'] = [
+  [1, 0, 0],
+  [0, -1, 0],
+  [0, 0, -1],
+];
+
+function random(seed: number): () => number {
+  let state = seed;
+  return () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return state / 2 ** 32;
+  };
+}
+
+/** The six sides of boxes as flat splats, 6 cm apart. `spoil` moves, fades and scatters some of them. */
+function cloudOf(boxes: readonly Box[], spoil?: () => number): GaussianCloud {
+  const centers: number[] = [];
+  const scales: number[] = [];
+  const opacities: number[] = [];
+  const add = (at: number[], scale: number[], opacity: number): void => {
+    const shift = spoil ? () => 0.03 * (spoil() - 0.5) : () => 0;
+    centers.push(at[0] + shift(), -(at[1] + shift()), -(at[2] + shift()));
+    scales.push(...scale);
+    opacities.push(opacity);
+  };
+  for (const { min, max } of boxes)
+    for (const axis of [0, 1, 2])
+      for (const side of [min, max]) {
+        const [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+        for (let a = min[u]; a <= max[u]; a += SPACING)
+          for (let b = min[v]; b <= max[v]; b += SPACING) {
+            const at = [0, 0, 0];
+            [at[axis], at[u], at[v]] = [side[axis], a, b];
+            const scale = [SPACING, SPACING, SPACING];
+            scale[axis] = 0.004;
+            add(at, scale, spoil ? 0.3 + 0.7 * spoil() : 0.95);
+          }
+      }
+  if (spoil)
+    for (let i = 0; i < 400; i++)
+      add([8 * spoil() - 4, 0.2 + 2 * spoil(), 8 * spoil() - 4], [0.03, 0.03, 0.03], 0.2 + 0.7 * spoil());
+  const count = opacities.length;
+  const rotations = new Float32Array(4 * count);
+  for (let i = 0; i < count; i++) rotations[4 * i] = 1;
+  return {
+    count,
+    origin: [0, 0, 0],
+    positions: Float32Array.from(centers),
+    scales: Float32Array.from(scales),
+    rotations,
+    opacities: Float32Array.from(opacities),
+    sh: new Float32Array(3 * count),
+    shDegree: 0,
+    antialiased: false,
+    droppedCount: 0,
+  };
+}
+
+/** A room of 8 by 8 m with a wall that has a door, a table, and stairs of 20 cm to a gallery that one can also walk under. */
+const ROOM: readonly Box[] = [
+  { min: [-4, -0.2, -4], max: [4, 0, 4] },
+  { min: [-4.2, 0, -4], max: [-4, 3, 4] },
+  { min: [4, 0, -4], max: [4.2, 3, 4] },
+  { min: [-4, 0, -4.2], max: [4, 3, -4] },
+  { min: [-4, 0, 4], max: [4, 3, 4.2] },
+  { min: [-4, 0, 0], max: [1, 2.6, 0.2] },
+  { min: [2.4, 0, 0], max: [4, 2.6, 0.2] },
+  { min: [-1, 0.7, -3], max: [1, 0.8, -2] },
+  ...Array.from({ length: 11 }, (_, i): Box => ({
+    min: [2.4, 0, -0.4 - 0.3 * (i + 1)],
+    max: [3.8, 0.2 * (i + 1), -0.4 - 0.3 * i],
+  })),
+  { min: [-4, 2.1, -4], max: [4, 2.2, -3.4] },
+];
+
+/** Whether a body of radius 10 cm at a place on the ground floor would be in a wall, or over the table. */
+function isOutside([x, y, z]: readonly [number, number, number]): boolean {
+  const touches = ({ min, max }: Box): boolean =>
+    x > min[0] - 0.1 &&
+    x < max[0] + 0.1 &&
+    z > min[2] - 0.1 &&
+    z < max[2] + 0.1 &&
+    max[1] > y + 0.35 &&
+    min[1] < y + 1.5;
+  return ROOM.some(touches);
+}
+
+/** Ten minutes of a random walk at 1.4 m/s, 72 steps a second. */
+function wander(
+  map: WalkMap,
+  isWrong: (at: readonly [number, number, number]) => boolean,
+): { out: number; levels: Set<number> } {
+  const next = random(7);
+  const levels = new Set<number>();
+  let at = map.start;
+  let out = 0;
+  for (let i = 0, heading = 0; i < 43_200; i++) {
+    heading += (next() - 0.5) * 0.2;
+    const to = stepOn(map, at, (Math.sin(heading) * 1.4) / 72, (Math.cos(heading) * 1.4) / 72);
+    if (to === at) heading = 2 * Math.PI * next();
+    at = to;
+    if (floorAt(map, at[0], at[2], at[1]) === undefined || isWrong(at)) out++;
+    levels.add(Math.round(at[1]));
+  }
+  return { out, levels };
+}
+
+test('a room of boxes: the floor, the gallery above it and the stairs between are one map', () => {
+  const map = makeWalkMap(cloudOf(ROOM), { frame: FRAME, near: [0, 1.5, 2] });
+  const ground = floorAt(map, 0, 2, 0);
+  assert.ok(ground !== undefined && Math.abs(ground) < 0.02, `the floor is at ${ground} m`);
+  const gallery = floorAt(map, 0, -3.7, 2.2);
+  assert.ok(gallery !== undefined && Math.abs(gallery - 2.2) < 0.03, `the gallery is at ${gallery} m`);
+  assert.ok(floorAt(map, 0, -3.7, 0) !== undefined, 'there is a floor below the gallery');
+  assert.equal(floorAt(map, 0, -2.5, 0), undefined, 'nobody stands in the table');
+  assert.equal(floorAt(map, 3.95, 2, 0), undefined, 'nobody stands in the wall');
+  assert.equal(wander(map, isOutside).out, 0);
+  const up = wayTo(map, [0, ground!, 2], [0, gallery!, -3.7]);
+  assert.ok(up.length > 40, `the way up goes through the door and over the stairs: ${up.length} cells`);
+  assert.ok(
+    up.every((place, i) => i === 0 || Math.abs(place[1] - up[i - 1][1]) <= map.step),
+    'no step is higher than a person takes',
+  );
+});
+
+test('the spoilt room: jitter, faint splats and floaters let no one out', () => {
+  const map = makeWalkMap(cloudOf(ROOM, random(3)), { frame: FRAME, near: [0, 1.5, 2] });
+  assert.ok(map.area > 40, `${map.area} m²`);
+  assert.equal(wander(map, isOutside).out, 0);
+});
+
+test('a walk map is stored in centimeters and read again', () => {
+  const map = makeWalkMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME, near: [0, 1.5, 2] });
+  const file = encodeWalkMap(map);
+  assert.ok(file.length < 3000, `${file.length} bytes`);
+  const { layers, ...rest } = decodeWalkMap(file);
+  const { layers: before, ...same } = map;
+  assert.deepEqual({ ...rest, heightUnit: undefined }, { ...same, heightUnit: undefined });
+  layers.forEach((layer, k) =>
+    layer.forEach((height, i) => {
+      assert.equal(Number.isNaN(height), Number.isNaN(before[k][i]));
+      if (!Number.isNaN(height)) assert.ok(Math.abs(height - before[k][i]) <= 0.0051);
+    }),
+  );
+});
+
+test('damaged walk maps are refused by name', () => {
+  const file = encodeWalkMap(makeWalkMap(cloudOf(ROOM.slice(0, 5)), { frame: FRAME }));
+  const damaged = [new Uint8Array(), new Uint8Array(3), file.subarray(0, 40), new Uint8Array(100).fill(31)];
+  for (let i = 0; i < 200; i++)
+    damaged.push(file.map((byte, at) => (at === (i * 37) % file.length ? byte ^ 0x55 : byte)));
+  for (const bytes of damaged)
+    try {
+      decodeWalkMap(bytes);
+    } catch (error) {
+      assert.equal((error as { code?: string }).code, 'decode/corrupt', String(error));
+    }
+  assert.throws(() => decodeWalkMap(file.subarray(0, 40)), { code: 'decode/corrupt' });
+});
+
+test('what is no room has no floor, and no exception', () => {
+  const single = cloudOf([{ min: [0, 0, 0], max: [0.1, 0.1, 0.1] }]);
+  const map = makeWalkMap(single, { frame: FRAME });
+  assert.equal(map.area < 4, true);
+  assert.equal(floorAt(map, 100, 100, 0), undefined);
+  assert.deepEqual(wayTo(map, [0, 0, 0], [50, 0, 50]), []);
+  assert.throws(() => makeWalkMap(single, { frame: FRAME, metersPerUnit: 0 }), { code: 'argument/value' });
+});
+
+test(
+  'the room of the gallery has the floor of its mesh',
+  { skip: !existsSync('demo/scenes/room.spz') && 'demo/scenes/room.spz is missing' },
+  async () => {
+    const cloud = await readScene(readFileSync('demo/scenes/room.spz'), { name: 'room.spz' });
+    const before = process.cpuUsage();
+    const map = makeWalkMap(cloud, { frame: FRAME, near: [0, 1.5, 0] });
+    const { user, system } = process.cpuUsage(before);
+    const heights = map.layers[0]
+      .filter((height) => !Number.isNaN(height))
+      .map(Math.abs)
+      .sort();
+    assert.ok(Math.abs(map.area - 87) < 1, `${map.area} m²`);
+    assert.ok(heights[heights.length >> 1] < 0.01, `median ${heights[heights.length >> 1]} m`);
+    assert.ok(heights[Math.floor(0.95 * heights.length)] < 0.04);
+    assert.ok(encodeWalkMap(map).length < 2000);
+    assert.ok(user + system < 6e6, `${(user + system) / 1e6} s of CPU`);
+  },
+);
