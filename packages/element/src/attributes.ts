@@ -9,7 +9,9 @@ import {
   angleGrammar,
   fieldOfViewGrammar,
   keywordGrammar,
+  lengthGrammar,
   numberGrammar,
+  optionalLengthGrammar,
   orbitGrammar,
   readAttribute,
   targetGrammar,
@@ -56,8 +58,8 @@ export type InteractionPrompt = 'auto' | 'none';
 /** `wiggle` turns the camera to and fro with the prompt; `basic` stands still. */
 export type InteractionPromptStyle = 'wiggle' | 'basic';
 
-/** What the camera does under a person's hands: turn around its target, or fly. */
-export type Navigation = 'orbit' | 'fly';
+/** What the camera does under a person's hands: turn around its target, fly, or walk on the floor. */
+export type Navigation = 'orbit' | 'fly' | 'walk';
 
 /** One attribute, as the tables of elements list them. Only types know `P`, of the property, and `V`, of what is read of it: never where the element takes the property as it is. */
 export interface Attribute<P, V = never> {
@@ -244,11 +246,30 @@ export const ATTRIBUTES = {
    */
   disableTap: flag(),
   /**
-   * `orbit` turns around the target. `fly` looks around, and moves with W, A, S, D, Q and E, faster with Shift.
+   * `orbit` turns around the target. `fly` looks around, and moves with W, A, S, D, Q and E, faster with Shift. `walk` stays on the floor, which the element finds
+   * in the splats: with W, A, S, D or the arrow keys, a click or a tap on the floor, a stick for the thumb, or a gamepad.
    * @default `orbit`
-   * @example navigation="fly"
+   * @example navigation="walk"
    */
-  navigation: keyword<Navigation>(['orbit', 'fly']),
+  navigation: keyword<Navigation>(['orbit', 'fly', 'walk']),
+  /**
+   * URL of a map of the floor for `navigation="walk"`, written by `gaussian-splat floor`. `auto` makes one from the splats after the scene has loaded.
+   * @default `auto`
+   * @example walk-map="museum.floor"
+   */
+  walkMap: read({ expected: 'auto, or a URL', fallback: 'auto', parse: (written): string => written.trim() || 'auto' }),
+  /**
+   * Height of a walker's eyes above the floor, with `m`, `cm` or `mm`.
+   * @default `1.6m`
+   * @example eye-height="1.2m"
+   */
+  eyeHeight: read(lengthGrammar('1.6m')),
+  /**
+   * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking takes a unit for one meter, and measured lengths have no unit.
+   * @default unknown
+   * @example unit="37cm"
+   */
+  unit: read(optionalLengthGrammar),
   /**
    * Turns the camera around the scene until a visitor touches it. It does not start for visitors who ask for less motion, nor while the scene has the
    * keyboard. A button stops it.

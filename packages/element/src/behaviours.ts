@@ -20,6 +20,8 @@ export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
   readonly input: InputOptions;
   readonly strings: SpokenStrings;
   readonly surface: HTMLElement | null;
+  /** What walks, once it is loaded. */
+  readonly walk: { readonly value: { readonly isRefused: boolean; ahead(meters: number): void } | undefined };
   requestFrame(): void;
   warn(sentence: string): void;
 }
@@ -111,7 +113,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   }
 
   get mayFly(): boolean {
-    return this.#host.input.enabled && this.#flies;
+    return this.#host.input.enabled && this.#flies && !this.#walks;
   }
 
   requestFrame(): void {
@@ -132,8 +134,13 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.attributes.interactionPromptStyle === 'wiggle' && !prefersReducedMotion();
   }
 
+  /** The camera stays on the floor; until one is found it stands still, and without one it flies. */
+  get #walks(): boolean {
+    return this.attributes.navigation === 'walk' && !this.#host.walk.value?.isRefused;
+  }
+
   get #flies(): boolean {
-    return this.attributes.navigation === 'fly';
+    return this.attributes.navigation !== 'orbit';
   }
 
   /** Few pages fly: the keys for it come later than the rest. */
@@ -188,7 +195,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     this.#touched();
     let moves = true;
     if (action.type === 'reset') camera.reset('user-interaction');
-    else if (action.type === 'pan') camera.panBy(action.right, action.up);
+    else if (action.type === 'pan') this.#walks || camera.panBy(action.right, action.up);
     else if (this.#flies) this.#fly(action);
     else if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
     else moves = camera.zoomBy(action.factor);
@@ -206,7 +213,11 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   /** In flight the scene follows the pointer: a drag across the picture turns the view by the picture's own angle. */
   #fly(action: Extract<CameraAction, { type: 'orbit' | 'zoom' }>): void {
     const camera = this.camera;
-    if (action.type === 'zoom') return camera.moveBy(0, 0, -Math.log(action.factor) * camera.bounds.radius);
+    if (action.type === 'zoom') {
+      const ahead = -Math.log(action.factor);
+      if (this.#walks) return this.#host.walk.value?.ahead(WHEEL_METERS * ahead);
+      return camera.moveBy(0, 0, ahead * camera.bounds.radius);
+    }
     const share = camera.fieldOfView.radians / (2 * Math.PI);
     camera.lookBy(-share * action.theta, -share * action.phi);
   }
@@ -218,6 +229,9 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
 
   readonly #onBlur = (): void => this.rest();
 }
+
+/** What a zoom by the factor e is worth for a walker, meters. */
+const WHEEL_METERS = 2;
 
 /** True while a person has come to the picture by keyboard, and nothing may move under their hands. */
 const hasKeyboard = (surface: HTMLElement | null): boolean => surface?.matches(':focus-visible') ?? false;

@@ -24,6 +24,7 @@ import type { DetailLevers, LoadedGaussians } from './gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
 import type { Place } from './gpu/painter.js';
 import { Lazy } from './lazy.js';
+import type { SceneRequest } from './loading/protocol.js';
 import type { Frame } from './live/frame-filter.js';
 import type { GeneratorInput } from './live/inputs.js';
 import type { LiveWiring } from './live/live-wiring.js';
@@ -70,6 +71,13 @@ export class Stage
   readonly tour = new Lazy('the code for views', async () => {
     const { Tour } = await import('./views/tour.js');
     return new Tour(this.element, this);
+  });
+  /** What walks on the floor. */
+  readonly walk = new Lazy('the code for walking', async () => {
+    const { WalkController } = await import('./walk/walk-controller.js');
+    const walk = new WalkController(this.element, this);
+    this.behaviours.add(walk);
+    return walk;
   });
   /** Labels of the page. */
   readonly labels = new Lazy('the code of labels', async () => {
@@ -350,6 +358,12 @@ export class Stage
     return frameOf(this.attributes, { up: this.sources.own.member?.scene.bounds.up });
   }
 
+  /** The request of a scene that has a file with a floor; null while there is none. */
+  get walkable(): SceneRequest | null {
+    const { scene } = this.sources.own;
+    return scene.state === 'ready' && !scene.scene?.live ? scene.shownRequest : null;
+  }
+
   prepareFrame(): string {
     this.sources.place();
     const { layout, changes, placements } = this.sources.world;
@@ -435,6 +449,8 @@ export class Stage
 
   /** Beside the scene is where somebody has lost it. */
   pick(clientX: number, clientY: number): void {
+    // A walker's click means that it goes there.
+    if (this.attributes.navigation === 'walk') return;
     this.positionFromPoint(clientX, clientY).then((point) => {
       if (point === null) this.act({ type: 'reset' });
       else if (this.input.pan) this.behaviours.aimAt([point.x, point.y, point.z]);
@@ -470,6 +486,7 @@ export class Stage
     this.live.post.want(this.sources.own.postprocess);
     if (!this.sources.own.isLeaving) this.playback.keepScene();
     if (this.views && !this.tour.value) this.#show(this.tour);
+    if (this.attributes.navigation === 'walk' && !this.walk.value) this.#show(this.walk);
     if (this.input.enabled) this.#hands.get().catch(this.#warnOf);
     this.reveal.settle();
     this.sources.request();

@@ -7,7 +7,7 @@ export interface TemplateModel {
   /** Text alternative; empty for a decorative scene, null where the page gives none. */
   readonly label: string | null;
   readonly controls: boolean;
-  readonly navigation: 'orbit' | 'fly';
+  readonly navigation: 'orbit' | 'fly' | 'walk';
   readonly poster: string | null;
   readonly posterLoading: 'lazy' | 'eager';
   readonly showPoster: boolean;
@@ -30,7 +30,7 @@ export interface TemplateModel {
   readonly strings: SpokenStrings;
   /** What screen readers are told: of an error, else of the camera. */
   readonly spoken: string;
-  /** SourceList of the hotspots. */
+  /** Slot names of the hotspots. */
   readonly hotspots: readonly string[];
 }
 

@@ -13,6 +13,10 @@ export const WORDS = {
   'keys-fly':
     'Arrow keys look around, W and S fly forward and back, A and D to the sides, E and Q up and down, with Shift faster, ' +
     'Home brings the view back.',
+  'keys-walk':
+    'The up and down arrow keys walk, left and right turn, W, A, S and D walk to all sides, with Shift faster. ' +
+    'A click on the floor walks there. Home brings the view back.',
+  blocked: 'Blocked',
   'interaction-prompt': 'Drag to look around',
   show: 'Show …',
   loading: 'Loading the 3D scene',

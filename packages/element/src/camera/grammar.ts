@@ -101,6 +101,26 @@ export function parsePoint(text: string): readonly [x: number, y: number, z: num
   return isPoint ? [x, y, z] : null;
 }
 
+/** A length above 0 with a unit, such as `1.6m` or `37cm`: meters, or null. */
+const parseExtent = (text: string): number | null => {
+  const quantity = parseQuantity(text.trim().toLowerCase());
+  const meters = quantity === null || quantity.unit === '' ? undefined : METRES_PER_UNIT[quantity.unit];
+  return meters !== undefined && quantity!.value > 0 ? quantity!.value * meters : null;
+};
+
+export const lengthGrammar = (fallback: string): AttributeGrammar<number> => ({
+  expected: 'a length above 0 with m, cm or mm',
+  fallback,
+  parse: parseExtent,
+});
+
+/** The same, or undefined: what is not written. */
+export const optionalLengthGrammar: AttributeGrammar<number | undefined> = {
+  expected: 'a length above 0 with m, cm or mm, such as 1m or 37cm',
+  fallback: '',
+  parse: (text) => (text === '' ? undefined : parseExtent(text)),
+};
+
 const ORBIT_FORM =
   '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %; "auto" for each, or left out from the end';
 const FIELD_OF_VIEW_FORM = 'an angle above 0deg and below 180deg with deg or rad, or "auto"';

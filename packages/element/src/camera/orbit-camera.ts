@@ -1,3 +1,4 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import { Damper } from './damper.js';
 import { eyeOfPose, orbitAxes, type Pose } from './orbit.js';
 
@@ -140,6 +141,11 @@ export class OrbitCamera {
   lookBy(theta: number, phi: number): void {
     const [x, y, z] = eyeOfPose(this.#goal);
     this.setGoal({ theta: this.#goal.theta + theta, phi: this.#goal.phi + phi });
+    this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
+  }
+
+  /** Puts the goal's eye at a point; it looks where it looked. */
+  setEye([x, y, z]: Vector3): void {
     this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
   }
 

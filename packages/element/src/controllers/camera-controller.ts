@@ -201,6 +201,19 @@ export class CameraController {
     this.#moveByUser();
   }
 
+  /** A person walks: puts the eye at a point of viewer space. Limits of the target do not apply to it. */
+  walkTo(eye: Vector3): void {
+    this.#camera.setEye(eye);
+    this.#moveByUser();
+  }
+
+  /** Looks straight ahead, at once: the pose of somebody who begins to walk. */
+  level(): void {
+    const { phi } = this.#camera.goal;
+    this.#camera.lookBy(0, Math.PI / 2 - phi);
+    this.jumpToGoal();
+  }
+
   /** A person changes the distance by a factor. @returns false at the limit */
   zoomBy(factor: number): boolean {
     const { radius } = this.#camera.goal;

@@ -109,6 +109,11 @@ export class SceneController implements ReactiveController {
     return this.#request?.url ?? '';
   }
 
+  /** The request of the scene on show; null while there is none. */
+  get shownRequest(): SceneRequest | null {
+    return this.#scene && !this.isPreview ? this.#shownRequest : null;
+  }
+
   /** The scene on show. */
   get scene(): LoadedGaussians | null {
     return this.#scene;

@@ -3,6 +3,7 @@ import type { ErrorData, ModelPlace } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
+import type { FloorRequest } from './make-floor.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
 import type {
   CodedFile,
@@ -115,6 +116,7 @@ export type WorkerRequest =
   | { readonly type: 'boxes'; readonly request: SceneRequest }
   | { readonly type: 'box'; readonly request: BoxRequest }
   | { readonly type: 'frame'; readonly request: MovedFrameRequest }
+  | { readonly type: 'floor'; readonly request: FloorRequest }
   | { readonly type: 'model'; readonly request: ModelRequest };
 
 export type PageMessage =

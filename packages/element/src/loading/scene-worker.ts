@@ -21,6 +21,8 @@ import {
 } from './protocol.js';
 import { loadScene, loadSequenceCode, named } from './load-scene.js';
 import type * as boxes from './lod-boxes.js';
+import type { FloorRequest } from './make-floor.js';
+import type { WalkMap } from '@gaussian-splat/formats/walk';
 
 export { loadScene };
 
@@ -63,6 +65,11 @@ export const openManifest = async (
 ): Promise<DetailManifest> => {
   const code = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
   return code.openManifest(request, signal, onProgress);
+};
+
+export const makeFloor = async (request: FloorRequest, signal: AbortSignal): Promise<WalkMap> => {
+  const code = await loadModule('the code that finds the floor', () => import('./make-floor.js'));
+  return code.makeFloor(request, signal);
 };
 
 export const openModel = async (request: ModelRequest, signal: AbortSignal): Promise<OpenedModel> => {
@@ -132,6 +139,10 @@ function serve(scope: WorkerScope): void {
     scope.postMessage({ type: 'reading', id });
     if (message.type === 'levels') return buildLevels(message, signal);
     if (message.type === 'box') return whole(readBox(message.request, signal));
+    if (message.type === 'floor') {
+      const map = await makeFloor(message.request, signal);
+      return [map, buffersOf(map.layers)];
+    }
     if (message.type === 'frame') {
       const scene = await readMovedFrame(message.request, signal, progressOf(id));
       return [scene, buffersOf(scene.packed)];

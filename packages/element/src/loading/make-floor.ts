@@ -1,0 +1,30 @@
+/** The walkable floor of a scene file; loaded by the worker when a page asks for it. */
+import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import { makeWalkMap, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
+import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
+import type { FileRequest } from './protocol.js';
+
+/** A scene file, and the body that walks in it. */
+export interface FloorRequest extends FileRequest {
+  readonly options: FloorOptions;
+}
+
+/**
+ * Reads a scene file once more, usually from the browser's cache, and finds its floor. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the
+ * signal's reason once that is aborted.
+ */
+export async function makeFloor(request: FloorRequest, signal: AbortSignal): Promise<WalkMap> {
+  const { url, credentials, options } = request;
+  const name = fileName(url);
+  try {
+    const limits = limitsFrom(request);
+    const fetchOptions = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, ...fileLimits(limits()) });
+    const bytes = await fetchScene(url, fetchOptions());
+    const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, fetchOptions);
+    const cloud = await readScene(bytes, { name, signal, openPart, ...limits() });
+    return makeWalkMap(cloud, options);
+  } catch (error) {
+    signal.throwIfAborted();
+    throw named(error, name);
+  }
+}

@@ -1,0 +1,37 @@
+import type { ViewerFrame } from '../camera/orbit.js';
+import { decodeWalkMap, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
+import type { Vector3 } from '@gaussian-splat/core';
+import type { SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+
+/** What a floor is made from. */
+export interface FloorSource {
+  readonly loader: SceneLoader;
+  /** What the scene was asked for by. */
+  readonly request: SceneRequest;
+  /** Absolute URL of a `.floor` file; null to make the map from the splats. */
+  readonly mapUrl: string | null;
+  readonly frame: ViewerFrame;
+  readonly metersPerUnit: number;
+  /** Height of the eyes, meters. */
+  readonly eyeHeight: number;
+  /** Eye of the camera, viewer space, meters. */
+  readonly near: Vector3;
+}
+
+/** Free height above the eyes that a body needs, meters. */
+const ABOVE_EYES = 0.1;
+
+/** The floor of a scene, from its file or from its splats, in a worker. Rejects with GaussianSplatError, or the signal's reason once that is aborted. */
+export async function openFloor(source: FloorSource, signal: AbortSignal): Promise<WalkMap> {
+  const { loader, request, mapUrl, frame, metersPerUnit, eyeHeight, near } = source;
+  const { url, file, credentials, limits } = request;
+  if (mapUrl !== null) {
+    const bytes = await loader.fetchFile({ url: mapUrl, credentials, limits }, signal);
+    return decodeWalkMap(new Uint8Array(bytes), mapUrl);
+  }
+  const options: FloorOptions = { metersPerUnit, frame, height: eyeHeight + ABOVE_EYES, near };
+  const asked = { url, file, credentials, limits, options };
+  return loader.ask({ type: 'floor', request: asked }, signal, ({ makeFloor }) => makeFloor(asked, signal));
+}
+

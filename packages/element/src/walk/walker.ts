@@ -1,0 +1,119 @@
+import type { Vector3 } from '@gaussian-splat/core';
+import { floorAt, stepOn, wayTo, type WalkMap } from '@gaussian-splat/formats/walk';
+
+/** Walking speed, meters in a second. */
+const SPEED = 1.4;
+const FAST = 2.5;
+/** Time constant with which the eyes follow steps of the floor, seconds. */
+const EYE_SECONDS = 0.08;
+/** A place of a path is reached at this distance, meters. */
+const REACHED = 0.05;
+
+type Place = readonly [x: number, y: number, z: number];
+
+/** A body on a walk map: meters, viewer space. It knows no page and no camera. */
+export class Walker {
+  readonly map: WalkMap;
+  #at: Place;
+  /** Height of the floor that the eyes have reached. */
+  #eyeFloor: number;
+  #path: readonly Place[] = [];
+  #isBlocked = false;
+
+  constructor(map: WalkMap, near: Vector3) {
+    this.map = map;
+    const below = floorBelow(map, near);
+    this.#at = below === undefined ? map.start : [near[0], below, near[2]];
+    this.#eyeFloor = this.#at[1];
+  }
+
+  /** Where the feet are. */
+  get at(): Place {
+    return this.#at;
+  }
+
+  /** Height of the floor as the eyes feel it, which follows steps smoothly. */
+  get eyeFloor(): number {
+    return this.#eyeFloor;
+  }
+
+  /** The last step did not move the body. */
+  get isBlocked(): boolean {
+    return this.#isBlocked;
+  }
+
+  /** Whether it needs more steps: it follows a path, or the eyes have not reached their height. */
+  get isMoving(): boolean {
+    return this.#path.length > 0 || this.#eyeFloor !== this.#at[1];
+  }
+
+  /**
+   * Sets out for a place on the floor.
+   * @returns whether there is a way
+   */
+  goTo(to: Vector3): boolean {
+    const height = floorAt(this.map, to[0], to[2], to[1]);
+    this.#path = height === undefined ? [] : wayTo(this.map, this.#at, [to[0], height, to[2]]);
+    return this.#path.length > 0;
+  }
+
+  /** Is at the end of its path at once. */
+  jump(): void {
+    const end = this.#path.at(-1);
+    this.#path = [];
+    if (end) this.#at = end;
+    this.#eyeFloor = this.#at[1];
+  }
+
+  /** Teleports to a place on the floor. @returns false if there is none */
+  teleport(to: Vector3): boolean {
+    const height = floorAt(this.map, to[0], to[2], to[1]);
+    if (height === undefined) return false;
+    this.#at = [to[0], height, to[2]];
+    this.jump();
+    return true;
+  }
+
+  /**
+   * Walks for some time.
+   * @param x direction in viewer space; 0 and 0 follow the path, lengths above 1 count as 1
+   */
+  step(seconds: number, x: number, z: number, isFast = false): void {
+    const way = SPEED * (isFast ? FAST : 1) * seconds;
+    const length = Math.max(1, Math.hypot(x, z));
+    if (x !== 0 || z !== 0) {
+      this.#path = [];
+      this.#go((way * x) / length, (way * z) / length);
+    } else this.#follow(way);
+    const share = 1 - Math.exp(-seconds / EYE_SECONDS);
+    const rest = this.#at[1] - this.#eyeFloor;
+    this.#eyeFloor = Math.abs(rest) < 1e-3 ? this.#at[1] : this.#eyeFloor + share * rest;
+  }
+
+  #follow(way: number): void {
+    for (let left = way; left > 0 && this.#path.length > 0; ) {
+      const [next] = this.#path;
+      const [dx, dz] = [next[0] - this.#at[0], next[2] - this.#at[2]];
+      const distance = Math.hypot(dx, dz);
+      const share = Math.min(1, left / Math.max(distance, 1e-9));
+      left -= distance;
+      if (distance > 0 && !this.#go(share * dx, share * dz)) this.#path = [];
+      if (distance <= Math.max(REACHED, way)) this.#path = this.#path.slice(1);
+    }
+  }
+
+  #go(dx: number, dz: number): boolean {
+    const to = stepOn(this.map, this.#at, dx, dz);
+    this.#isBlocked = to === this.#at;
+    this.#at = to;
+    return !this.#isBlocked;
+  }
+}
+
+/** The highest floor below a point; undefined if there is none. */
+function floorBelow({ corner, cell, width, depth, layers }: WalkMap, [x, y, z]: Vector3): number | undefined {
+  const [i, j] = [Math.floor((x - corner[0]) / cell), Math.floor((z - corner[1]) / cell)];
+  if (!(i >= 0 && j >= 0 && i < width && j < depth)) return undefined;
+  const below = layers.map((layer) => layer[i + width * j]).filter((height) => height <= y);
+  return below.length > 0 ? Math.max(...below) : undefined;
+}

@@ -1,0 +1,131 @@
+/** Walking on a floor that the element finds in the splats. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, atRest, claimFault, delay, frames, nextEvent, show, until } from './support/harness.js';
+
+/** Flat splats on the floor and walls of a room of `side` by `side` meters, the floor at height 0: a `.splat` file, y down. */
+function room(side: number, unit = 1): string {
+  const [step, sigma, half] = [0.1, 0.07, side / 2];
+  const splats: [number, number, number, number][] = [];
+  for (let a = -half; a <= half; a += step)
+    for (let b = -half; b <= half; b += step) {
+      splats.push([a, 0, b, 1]);
+      const height = b + half;
+      if (height > 2.4) continue;
+      for (const wall of [-half, half]) splats.push([wall, height, a, 0], [a, height, wall, 2]);
+    }
+  const bytes = new DataView(new ArrayBuffer(32 * splats.length));
+  splats.forEach(([x, y, z, flat], i) => {
+    [x, -y, -z].forEach((value, axis) => bytes.setFloat32(32 * i + 4 * axis, value / unit, true));
+    for (const axis of [0, 1, 2])
+      bytes.setFloat32(32 * i + 12 + 4 * axis, (axis === flat ? 0.005 : sigma) / unit, true);
+    const color = flat === 1 ? [200, 60, 60, 250] : [80, 80, 200, 250];
+    [...color, 255, 128, 128, 128].forEach((value, k) => bytes.setUint8(32 * i + 24 + k, value));
+  });
+  return `${URL.createObjectURL(new Blob([bytes.buffer]))}#room.splat`;
+}
+
+async function walkIn(src: string, attributes: Record<string, string> = {}): Promise<GaussianSplatElement> {
+  const element = show(
+    {
+      src,
+      navigation: 'walk',
+      'camera-controls': '',
+      'interpolation-decay': '0',
+      'interaction-prompt': 'none',
+      ...attributes,
+    },
+    'width: 200px; height: 160px',
+  );
+  await nextEvent(element, 'walk-ready');
+  return element;
+}
+
+/** Eye of the camera, viewer space. */
+function eyeOf(element: GaussianSplatElement): [number, number, number] {
+  const { theta, phi, radius } = element.getCameraOrbit();
+  const { x, y, z } = element.getCameraTarget();
+  return [
+    x + radius * Math.sin(theta) * Math.sin(phi),
+    y + radius * Math.cos(phi),
+    z + radius * Math.cos(theta) * Math.sin(phi),
+  ];
+}
+
+const viewOf = (element: GaussianSplatElement): HTMLElement => element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+
+function press(element: GaussianSplatElement, type: 'keydown' | 'keyup', code: string): void {
+  viewOf(element).dispatchEvent(new KeyboardEvent(type, { code, key: code, bubbles: true, cancelable: true }));
+}
+
+const near = (actual: number, expected: number, tolerance: number, what: string): void =>
+  assert(Math.abs(actual - expected) <= tolerance, `${what}: expected ${expected}, found ${actual}`);
+
+describe('navigation="walk"', () => {
+  it('stands on the floor at the height of the eyes, walks by keys and stops at walls, which are said once', async () => {
+    const element = await walkIn(room(5));
+    near(eyeOf(element)[1], 1.6, 0.03, 'height of the eyes');
+    near(element.getCameraOrbit().phi, Math.PI / 2, 1e-6, 'it looks straight ahead');
+    const [x, , z] = eyeOf(element);
+    press(element, 'keydown', 'KeyW');
+    const status = (): string => element.shadowRoot!.querySelector('[role="status"]')!.textContent;
+    await until(() => status() === 'Blocked', 'the wall');
+    const texts = new Set<string>();
+    const seen = new MutationObserver(() => texts.add(status()));
+    seen.observe(element.shadowRoot!, { subtree: true, characterData: true, childList: true });
+    await delay(300);
+    press(element, 'keyup', 'KeyW');
+    seen.disconnect();
+    assertEqual([...texts].filter((text) => text === 'Blocked').length <= 1, true, 'said once');
+    const [toX, toY, toZ] = eyeOf(element);
+    near(toY, 1.6, 0.05, 'height at the wall');
+    near(toX, x, 0.1, 'straight ahead');
+    assert(z - toZ > 1, `it walked ${z - toZ} m`);
+    assert(toZ > -2.35 && toZ < -1.9, `it stopped at ${toZ}, the wall is at -2.5`);
+    // Idle pages draw nothing.
+    await atRest(element);
+  });
+
+  it('turns by the arrow keys and walks to a click on the floor', async () => {
+    const element = await walkIn(room(5));
+    const { theta } = element.getCameraOrbit();
+    press(element, 'keydown', 'ArrowLeft');
+    await delay(100);
+    press(element, 'keyup', 'ArrowLeft');
+    assert(element.getCameraOrbit().theta > theta, 'turned to the left');
+    await atRest(element);
+    const before = eyeOf(element);
+    const { left, top, width, height } = element.getBoundingClientRect();
+    const at = { clientX: left + width / 2, clientY: top + 0.95 * height };
+    const target = await element.positionFromPoint(at.clientX, at.clientY);
+    assert(target && Math.abs(target.y) < 0.1, `a point of the floor: ${target?.toString()}`);
+    viewOf(element).dispatchEvent(new MouseEvent('click', { ...at, bubbles: true }));
+    const distance = (): number => Math.hypot(eyeOf(element)[0] - target.x, eyeOf(element)[2] - target.z);
+    await until(() => distance() < 0.15 || Math.abs(eyeOf(element)[2]) > 2.1, 'the place of the click');
+    assert(Math.hypot(eyeOf(element)[0] - before[0], eyeOf(element)[2] - before[2]) > 0.3, 'it has walked');
+  });
+
+  it('takes the unit of the file: the same room in units of 50 cm', async () => {
+    const element = await walkIn(room(5, 0.5), { unit: '50cm', 'eye-height': '120cm' });
+    near(eyeOf(element)[1], 2.4, 0.06, 'eyes, in units of the file');
+  });
+
+  it('warns and flies where there is no floor', async () => {
+    const fault = claimFault(/navigation="walk".*m².*up and unit.*walk-map/s);
+    const element = show(
+      { src: room(0.5), navigation: 'walk', 'camera-controls': '', 'interaction-prompt': 'none' },
+      'width: 120px; height: 100px',
+    );
+    await element.ready;
+    await fault;
+    const before = eyeOf(element);
+    // The keys of flight are loaded now.
+    await until(() => {
+      press(element, 'keydown', 'KeyE');
+      press(element, 'keyup', 'KeyE');
+      element.jumpCameraToGoal();
+      return eyeOf(element)[1] > before[1];
+    }, 'flight');
+    await frames();
+  });
+});
