@@ -10,7 +10,7 @@ export interface FloorOptions extends GridOptions {
   readonly radius?: number;
   /** Largest step up or down, meters; default 0.3. */
   readonly step?: number;
-  /** Point, meters and y up, near which the walk starts: the largest floor below it is taken. Default: above the middle of the scene. */
+  /** Point, meters and y up, near which the walk starts. Default: above the middle of the scene. */
   readonly near?: Vector3;
 }
 
@@ -21,7 +21,7 @@ const REACH = 3;
 
 /**
  * Finds the floor of a scene on which a person can walk, from its splats alone: solid voxels with free height above them, joined by a flood fill of places
- * that hold a body. Of all floors that come near the start it takes the largest.
+ * that hold a body. It takes the largest floor below the point `near` that comes within 3 m of it; if there is none, the lowest of the large floors.
  * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite.
  */
 export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMap {
@@ -51,6 +51,25 @@ interface Region {
   /** Index of the cell nearest to the start, and its distance in meters. */
   readonly nearest: number;
   readonly distance: number;
+  /** Height of the cell at which the fill began, meters. */
+  readonly bottom: number;
+}
+
+const NOWHERE: Region = { cells: [], heights: [], nearest: 0, distance: 0, bottom: 0 };
+/** Share of the largest floor that another must have to be preferred to it because it is lower. */
+const COMPARABLE = 0.5;
+
+const largestOf = (regions: readonly Region[]): Region | undefined =>
+  regions.reduce<Region | undefined>(
+    (best, region) => (best && best.cells.length >= region.cells.length ? best : region),
+    undefined,
+  );
+
+/** The lowest of the large floors: seen from outside, a roof may be as large as the floor under it. */
+function lowestOf(regions: readonly Region[]): Region {
+  const most = largestOf(regions)?.cells.length ?? 0;
+  const large = regions.filter(({ cells }) => cells.length >= COMPARABLE * most);
+  return large.reduce((best, region) => (region.bottom < best.bottom ? region : best), large[0] ?? NOWHERE);
 }
 
 class FloorFinder {
@@ -75,18 +94,15 @@ class FloorFinder {
 
   find(near: Vector3): WalkMap {
     const [nx] = this.#grid.size;
-    let best: Region | undefined;
+    const regions: Region[] = [];
     this.#floors.forEach((heights, c) => {
       for (const height of heights) {
-        const [x, z] = [c % nx, Math.floor(c / nx)];
-        if (height > near[1] || this.#isSeen(c, height) || this.#isBlocked(x, z, height)) continue;
-        const region = this.#fill(c, height, near);
-        const isLarger = !best || region.cells.length > best.cells.length;
-        const isReached = region.distance <= REACH || near[1] === Infinity;
-        if (isReached && isLarger) best = region;
+        if (this.#isSeen(c, height) || this.#isBlocked(c % nx, Math.floor(c / nx), height)) continue;
+        regions.push(this.#fill(c, height, near));
       }
     });
-    return this.#mapOf(best ?? { cells: [], heights: [], nearest: 0, distance: 0 });
+    const reached = regions.filter(({ distance, bottom }) => distance <= REACH && bottom <= near[1]);
+    return this.#mapOf(largestOf(reached) ?? lowestOf(regions));
   }
 
   /** Heights of the floors of a column, from the top down. The surface lies where extinction peaks, found by a parabola through three voxels. */
@@ -187,7 +203,7 @@ class FloorFinder {
         heights.push(reached);
       }
     }
-    return { cells, heights, nearest, distance: shortest * voxel };
+    return { cells, heights, nearest, distance: shortest * voxel, bottom: height };
   }
 
   /** The region alone, cut to its own rectangle. */
