@@ -26,6 +26,24 @@ test('detail: a word, or pixels', () => {
   }
 });
 
+test('lengths of walkers: above 0, with a unit', () => {
+  const read = (raw: object, warn: (sentence: string) => void = assert.fail): unknown[] => {
+    const { eyeHeight, unit, walkMap, navigation } = readAttributes({ ...ABSENT, ...raw } as RawAttributes, warn);
+    return [eyeHeight, unit, walkMap, navigation];
+  };
+  assert.deepEqual(read({}), [1.6, undefined, 'auto', 'orbit']);
+  assert.deepEqual(read({ eyeHeight: '120cm', unit: ' 37CM ', walkMap: ' a.floor ', navigation: 'walk' }), [
+    ...[1.2, 0.37, 'a.floor', 'walk'],
+  ]);
+  for (const malformed of ['1', '0m', '-1m', 'auto', '1 m', '1km']) {
+    const said: string[] = [];
+    assert.deepEqual(read({ eyeHeight: malformed, unit: malformed }, (text) => said.push(text)).slice(0, 2), [
+      ...[1.6, undefined],
+    ]);
+    assert.equal(said.length, 2, malformed);
+  }
+});
+
 test('orbits', () => {
   assert.deepEqual(orbit.parse('90deg 1rad 2m'), { theta: 90 * DEGREE, phi: 1, radius: { metres: 2 } });
   assert.deepEqual(orbit.parse('  -10.5deg\t0   150cm '), { theta: -10.5 * DEGREE, phi: 0, radius: { metres: 1.5 } });

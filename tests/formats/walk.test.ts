@@ -1,5 +1,8 @@
 import assert from 'node:assert/strict';
-import { existsSync, readFileSync } from 'node:fs';
+import { spawnSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { test } from 'node:test';
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
@@ -207,5 +210,27 @@ test(
     assert.ok(heights[Math.floor(0.95 * heights.length)] < 0.04);
     assert.ok(encodeWalkMap(map).length < 2000);
     assert.ok(user + system < 6e6, `${(user + system) / 1e6} s of CPU`);
+  },
+);
+
+test(
+  'gaussian-splat floor writes the map, and names what it misses',
+  { skip: !existsSync('demo/scenes/room.spz') && 'demo/scenes/room.spz is missing' },
+  () => {
+    const folder = mkdtempSync(join(tmpdir(), 'floor-'));
+    try {
+      const out = join(folder, 'room.floor');
+      const run = (...args: string[]): ReturnType<typeof spawnSync> =>
+        spawnSync(process.execPath, ['packages/cli/bin/gaussian-splat.mjs', 'floor', ...args], { encoding: 'utf8' });
+      const { stdout, stderr, status } = run('demo/scenes/room.spz', '--out', out, '--cell', '10cm');
+      assert.equal(status, 0, String(stderr));
+      assert.match(String(stdout), /8[67]\.\d m² of floor/);
+      assert.ok(Math.abs(decodeWalkMap(readFileSync(out)).area - 86.8) < 1);
+      const wrong = run('demo/scenes/room.spz', '--out', out, '--unit', '5');
+      assert.equal(wrong.status, 2);
+      assert.match(String(wrong.stderr), /--unit: expected a length/);
+    } finally {
+      rmSync(folder, { recursive: true, force: true });
+    }
   },
 );

@@ -308,8 +308,8 @@ export const ATTRIBUTES = {
   interactionPromptThreshold: number(milliseconds(3_000)),
   /**
    * The words of the element in the language of the page: JSON or, as a property, an object. Keys: `front`, `upper-front`, `lower-front`, the same three
-   * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-views`; `views`, `next-view`, `previous-view`;
-   * `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`; and `error-` before each `error.code`. Without it the words are
+   * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-walk`, `keys-views`; `views`, `next-view`, `previous-view`;
+   * `show` (`…` stands for `alt`), `loading`, `blocked`, `reset`, `pause`, `play`, `details`; and `error-` before each `error.code`. Without it the words are
    * English, and marked as English.
    * @default English
    * @example a11y='{ "pause": "Anhalten", "play": "Abspielen" }'

@@ -14,7 +14,7 @@ import type { StageHost } from './stage-host.js';
 import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
-import { readSpokenStrings, type SpokenStrings } from './words.js';
+import { readSpokenStrings, word, type SpokenStrings } from './words.js';
 
 /** Size of the scene shown. */
 export interface SceneStatistics {
@@ -102,6 +102,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
  * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
+ * @fires {CustomEvent<WalkReadyDetail>} walk-ready - Fired when the floor of `navigation="walk"` is known and the camera stands on it.
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - The element has come into sight, or left it.
  * @fires {CustomEvent<ElementError>} generator-error - A run of the generator failed; the last good frame stays.
@@ -299,7 +300,9 @@ export class GaussianSplatElement extends ViewingMethods {
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       controls: this.cameraControls,
-      navigation: this.#attributes.navigation,
+      keys:
+        this.stage.walk.value?.keys ??
+        word(this.#strings, this.#attributes.navigation === 'orbit' ? 'keys-orbit' : 'keys-fly'),
       poster: this.poster,
       posterLoading: this.#attributes.loading,
       showPoster: reveal.isCovered,

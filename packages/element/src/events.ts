@@ -17,6 +17,11 @@ export interface ViewChangeDetail {
   readonly index: number;
 }
 
+export interface WalkReadyDetail {
+  /** Area of the floor, m². */
+  readonly area: number;
+}
+
 export interface LoadDetail {
   /** Absolute URL of the scene. */
   readonly url: string;
@@ -57,6 +62,8 @@ export interface GaussianSplatEventMap {
   'camera-change': CustomEvent<CameraChangeDetail>;
   /** The camera sets out for a view of the list. */
   'view-change': CustomEvent<ViewChangeDetail>;
+  /** Fired when the floor of `navigation="walk"` is known and the camera stands on it. */
+  'walk-ready': CustomEvent<WalkReadyDetail>;
   /** The poster has given way to the scene. */
   'poster-dismissed': Event;
   /** The element has come into sight, or left it. */

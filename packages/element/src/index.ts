@@ -12,6 +12,7 @@ export type {
   PreviewDetail,
   ViewChangeDetail,
   VisibilityDetail,
+  WalkReadyDetail,
 } from './events.js';
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
 export type { SceneStats } from './stats.js';

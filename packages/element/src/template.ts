@@ -7,7 +7,8 @@ export interface TemplateModel {
   /** Text alternative; empty for a decorative scene, null where the page gives none. */
   readonly label: string | null;
   readonly controls: boolean;
-  readonly navigation: 'orbit' | 'fly' | 'walk';
+  /** Help for the keys of the scene. */
+  readonly keys: string;
   readonly poster: string | null;
   readonly posterLoading: 'lazy' | 'eager';
   readonly showPoster: boolean;
@@ -49,7 +50,7 @@ export function template(model: TemplateModel): TemplateResult {
 }
 
 /** The picture. One canvas for life, whatever the attributes: a context cannot move from one to another. */
-function view({ label, controls: isControlled, navigation, onReveal, error, strings }: TemplateModel): TemplateResult {
+function view({ label, controls: isControlled, keys, onReveal, error, strings }: TemplateModel): TemplateResult {
   const controls = isControlled && error === null;
   const role = controls ? 'application' : label === '' ? 'presentation' : 'img';
   // Behind a poster that waits for a person there is nothing to see or to do yet.
@@ -67,7 +68,7 @@ function view({ label, controls: isControlled, navigation, onReveal, error, stri
     >
       <canvas part="canvas"></canvas>
     </div>
-    ${controls ? help(word(strings, `keys-${navigation}`), strings) : nothing}
+    ${controls ? help(keys, strings) : nothing}
   `;
 }
 

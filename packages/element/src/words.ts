@@ -13,10 +13,6 @@ export const WORDS = {
   'keys-fly':
     'Arrow keys look around, W and S fly forward and back, A and D to the sides, E and Q up and down, with Shift faster, ' +
     'Home brings the view back.',
-  'keys-walk':
-    'The up and down arrow keys walk, left and right turn, W, A, S and D walk to all sides, with Shift faster. ' +
-    'A click on the floor walks there. Home brings the view back.',
-  blocked: 'Blocked',
   'interaction-prompt': 'Drag to look around',
   show: 'Show …',
   loading: 'Loading the 3D scene',
@@ -29,10 +25,16 @@ export const WORDS = {
 /** Words of the bar of the views, which few pages have. */
 export type ViewWord = 'views' | 'next-view' | 'previous-view' | 'keys-views';
 
+/** Words of walking, which few pages have. */
+export type WalkWord = 'keys-walk' | 'blocked';
+
 /** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
 export type SpokenStrings = Readonly<
   Partial<
-    Record<ViewName | keyof typeof WORDS | keyof typeof PANEL_WORDS | `error-${ElementErrorCode}` | ViewWord, string>
+    Record<
+      ViewName | keyof typeof WORDS | keyof typeof PANEL_WORDS | `error-${ElementErrorCode}` | ViewWord | WalkWord,
+      string
+    >
   >
 >;
 

@@ -1,6 +1,7 @@
 import type { ViewerFrame } from '../camera/orbit.js';
 import { decodeWalkMap, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
-import type { Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
+import { isStreamed } from '../gpu/open-scene.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
@@ -30,8 +31,14 @@ export async function openFloor(source: FloorSource, signal: AbortSignal): Promi
     const bytes = await loader.fetchFile({ url: mapUrl, credentials, limits }, signal);
     return decodeWalkMap(new Uint8Array(bytes), mapUrl);
   }
+  if (isStreamed(request))
+    throw new GaussianSplatError('argument/value', {
+      where: 'walk-map',
+      expected: 'a file of the floor, since the scene is streamed',
+      found: 'none',
+      remedy: 'make one with gaussian-splat floor from the file that the folder was made from',
+    });
   const options: FloorOptions = { metersPerUnit, frame, height: eyeHeight + ABOVE_EYES, near };
   const asked = { url, file, credentials, limits, options };
   return loader.ask({ type: 'floor', request: asked }, signal, ({ makeFloor }) => makeFloor(asked, signal));
 }
-

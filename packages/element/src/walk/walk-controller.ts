@@ -8,7 +8,7 @@ import type { CameraController } from '../controllers/camera-controller.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion-controller.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
-import { word, type SpokenStrings } from '../words.js';
+import type { SpokenStrings, WalkWord } from '../words.js';
 import { openFloor } from './floor-source.js';
 import { Joystick } from './joystick.js';
 import { Walker } from './walker.js';
@@ -29,6 +29,12 @@ export interface WalkHost {
   warn(sentence: string): void;
 }
 
+const WORDS: Readonly<Record<WalkWord, string>> = {
+  'keys-walk':
+    'The up and down arrow keys walk, left and right turn, W, A, S and D walk to all sides, with Shift faster. ' +
+    'A click on the floor walks there. Home brings the view back.',
+  blocked: 'Blocked',
+};
 /** A floor that is smaller is none, m². */
 const MIN_AREA = 4;
 /** What a short press is worth at least, ms. */
@@ -77,6 +83,11 @@ export class WalkController implements ReactiveController, Mover {
 
   get isRefused(): boolean {
     return this.#isRefused;
+  }
+
+  /** Help for the keys; undefined unless they walk. */
+  get keys(): string | undefined {
+    return this.#of.attributes.navigation === 'walk' && !this.#isRefused ? this.#word('keys-walk') : undefined;
   }
 
   /** Area of the floor, m²; undefined before it is known. */
@@ -159,7 +170,7 @@ export class WalkController implements ReactiveController, Mover {
   /** A screen reader hears of a wall once. */
   #tellBlocked(isWalking: boolean): void {
     const isBlocked = isWalking && this.#walker!.isBlocked;
-    if (isBlocked && !this.#isSaid) this.#of.behaviours.announcer.say(word(this.#of.strings, 'blocked'));
+    if (isBlocked && !this.#isSaid) this.#of.behaviours.announcer.say(this.#word('blocked'));
     if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviours.announcer.say('');
     this.#isSaid = isBlocked || (this.#isSaid && !isWalking);
   }
@@ -188,6 +199,7 @@ export class WalkController implements ReactiveController, Mover {
         this.#walker = new Walker(map, eye);
         camera.level();
         this.#follow();
+        camera.jumpToGoal();
         this.#host.requestUpdate();
         this.#of.element.dispatchEvent(new CustomEvent('walk-ready', { detail: { area: map.area } }));
       },
@@ -274,6 +286,10 @@ export class WalkController implements ReactiveController, Mover {
       turn -= beyond(pad.axes[2]);
     }
     return [right, forward, turn];
+  }
+
+  #word(key: WalkWord): string {
+    return this.#of.strings[key] ?? WORDS[key];
   }
 
   #forget(): void {

@@ -91,7 +91,7 @@ export class Walker {
   }
 
   #follow(way: number): void {
-    for (let left = way; left > 0 && this.#path.length > 0; ) {
+    for (let left = way; left > 0 && this.#path.length > 0;) {
       const [next] = this.#path;
       const [dx, dz] = [next[0] - this.#at[0], next[2] - this.#at[2]];
       const distance = Math.hypot(dx, dz);

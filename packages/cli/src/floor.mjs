@@ -1,0 +1,106 @@
+/** The work behind `gaussian-splat floor`: reads a scene, finds the floor on which a person can walk, and writes it as a map. */
+import { readScene } from '@gaussian-splat/formats';
+import { encodeWalkMap, makeWalkMap } from '@gaussian-splat/formats/walk';
+import { basename, dirname, join, resolve } from 'node:path';
+import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import { readWhole } from './lib/input-file.mjs';
+import { writeWhole } from './lib/output-file.mjs';
+
+const USAGE = `usage: gaussian-splat floor SCENE --out FILE.floor [options]
+
+  --out FILE      the map, for the attribute walk-map
+  --unit LENGTH   length of one unit of the scene, such as 1m or 37cm; default 1m
+  --up AXIS       what points up in the scene: x, -x, y, -y, z or -z; default: what the file says, else -y
+  --near X,Y,Z    point, meters and y up, below which the walk starts; default: the middle of the scene
+  --eyes LENGTH   height of a walker's eyes; default 1.6m
+  --cell LENGTH   edge of a cell of the map; default 5cm
+`;
+
+const METERS = { m: 1, cm: 0.01, mm: 0.001 };
+/** Free height above the eyes that a body needs, meters: that of the element. */
+const ABOVE_EYES = 0.1;
+/** Rows of the rotations to a frame with y up; those of the element's attribute `up`. */
+const FRAMES = {
+  x: [
+    [0, -1, 0],
+    [1, 0, 0],
+    [0, 0, 1],
+  ],
+  '-x': [
+    [0, 1, 0],
+    [-1, 0, 0],
+    [0, 0, 1],
+  ],
+  y: [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ],
+  '-y': [
+    [1, 0, 0],
+    [0, -1, 0],
+    [0, 0, -1],
+  ],
+  z: [
+    [1, 0, 0],
+    [0, 0, 1],
+    [0, -1, 0],
+  ],
+  '-z': [
+    [1, 0, 0],
+    [0, 0, -1],
+    [0, 1, 0],
+  ],
+};
+
+function parseOptions(args) {
+  const text = { type: 'string' };
+  const parsed = parseSceneOptions(args, {
+    ...{ out: text, up: text, near: text },
+    ...{ unit: { ...text, default: '1m' }, eyes: { ...text, default: '1.6m' }, cell: { ...text, default: '5cm' } },
+  });
+  if (parsed === undefined) return undefined;
+  const { values, scene } = parsed;
+  if (values.out === undefined) throw new UsageError('--out is missing');
+  if (values.up !== undefined && !(values.up in FRAMES))
+    throw new UsageError(`--up: expected x, -x, y, -y, z or -z, found "${values.up}"`);
+  const near = values.near?.split(',').map(Number);
+  if (near && (near.length !== 3 || !near.every(Number.isFinite)))
+    throw new UsageError(`--near: expected X,Y,Z, found "${values.near}"`);
+  const length = (name) => {
+    const [, number, unit] = /^(\d+\.?\d*|\.\d+)(m|cm|mm)$/.exec(values[name]) ?? [];
+    if (!(Number(number) > 0))
+      throw new UsageError(`--${name}: expected a length such as 1.6m or 37cm, found "${values[name]}"`);
+    return Number(number) * METERS[unit];
+  };
+  return {
+    scene: resolve(from, scene),
+    out: resolve(from, values.out),
+    up: values.up,
+    options: { near, metersPerUnit: length('unit'), voxel: length('cell'), height: length('eyes') + ABOVE_EYES },
+  };
+}
+
+/** Name of the axis that a file's own direction is nearest to. */
+function axisOf([x, y, z]) {
+  const axes = { x, '-x': -x, y, '-y': -y, z, '-z': -z };
+  return Object.entries(axes).reduce((best, axis) => (axis[1] > best[1] ? axis : best))[0];
+}
+
+async function main({ scene, out, up, options }) {
+  const openPart = (part) => readWhole(join(dirname(scene), part));
+  const cloud = await readScene(await readWhole(scene), { name: basename(scene), openPart });
+  sayWarnings(basename(scene), cloud);
+  const map = makeWalkMap(cloud, { ...options, frame: FRAMES[up ?? axisOf(cloud.hints?.up ?? [0, -1, 0])] });
+  if (map.layers.length === 0)
+    throw new Error(`${basename(scene)} has no floor: check --up and --unit, or name a point above it with --near`);
+  const bytes = encodeWalkMap(map);
+  await writeWhole(out, bytes);
+  const heights = map.layers.flatMap((layer) => [...layer].filter((height) => !Number.isNaN(height)));
+  const range = [Math.min, Math.max].map((pick) => heights.reduce((a, b) => pick(a, b)).toFixed(2));
+  console.log(
+    `${out}: ${map.area.toFixed(1)} m² of floor at heights ${range.join(' to ')} m, cells of ${(100 * map.cell).toFixed(1)} cm, ${bytes.length} bytes`,
+  );
+}
+
+await runCommand(USAGE, parseOptions, main);
