@@ -195,8 +195,9 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     this.#touched();
     let moves = true;
     if (action.type === 'reset') camera.reset('user-interaction');
-    else if (action.type === 'pan') this.#walks || camera.panBy(action.right, action.up);
-    else if (this.#flies) this.#fly(action);
+    else if (action.type === 'pan') {
+      if (!this.#walks) camera.panBy(action.right, action.up);
+    } else if (this.#flies) this.#fly(action);
     else if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
     else moves = camera.zoomBy(action.factor);
     // The button that brings the camera back comes and goes with this.
