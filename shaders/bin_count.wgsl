@@ -1,5 +1,5 @@
 // How many bins each splat touches: one thread for each splat, in depth order; the sum of each group of 256.
-#import shared/bins
+#import shared/bin_side
 #import shared/coverage
 #import shared/plan
 #import shared/group
@@ -15,7 +15,7 @@
 
 fn bin_rect(s: ProjectedSplat) -> u32 {
   let c = coverage_of(s);
-  let size = vec2f(f32(BIN_WIDTH), f32(BIN_HEIGHT));
+  let size = bin_size();
   // Pixel centres are what counts, half a pixel inside the edges.
   let low = clamp(c.center - c.extent - 0.5, vec2f(0.0), view.viewport - 1.0);
   let high = clamp(c.center + c.extent + 0.5, vec2f(0.0), view.viewport - 1.0);

@@ -1,6 +1,6 @@
 // Where each bin begins and ends among the pairs, once they are sorted by bin; and for each tile of a bin a bit for each pair, so that
 // a tile finds the few that touch it without reading the others.
-#import shared/bins
+#import shared/bin_side
 #import shared/coverage
 #import shared/plan
 #import shared/group
@@ -22,9 +22,9 @@ var<workgroup> masks: array<u32, MASK_ROW * PAIR_WORDS>;
 
 // The tiles of a bin that a splat touches, a bit each, rows of eight.
 fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
-  let corner = vec2f(f32(bin.x * BIN_WIDTH), f32(bin.y * BIN_HEIGHT));
-  let tile = f32(TILE);
-  // Row k holds the pixel centres k·16 + 0.5 ... k·16 + 15.5. Only the rows at hand: threads side by side have others.
+  let corner = vec2f(bin) * bin_size();
+  let tile = f32(tile_side);
+  // Row k holds the pixel centers k·tile + 0.5 ... (k + 1)·tile - 0.5. Only the rows at hand: threads side by side have others.
   let low = c.center.y - c.extent.y - corner.y - RIM;
   let high = c.center.y + c.extent.y - corner.y + RIM;
   let first_row = clamp(ceil((low - (tile - 0.5)) / tile), 0.0, f32(BIN_ROWS));

@@ -1,11 +1,10 @@
 // Paints tiles and notes nothing.
-#import shared/nothing_else
-#import shared/paint_listed
-
-const NOTES_SPLATS = false;
+#import shared/paint_columns
 
 fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {}
+fn start_hiding(position: vec2u) {}
+fn hidden_by(light: Column, k: u32) -> Column { return light; }
 fn clear_notes(lane: u32) {}
-fn note_blend(k: u32, weight: f32, before: f32, after: f32, blue_depth: u32) {}
+fn note_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {}
 fn keep_notes(k: u32) {}
-fn note_pixel(pixel: vec2u) {}
+fn note_pixel(pixel: vec2u, row: u32) {}

@@ -6,12 +6,15 @@
 #import shared/gathered
 #import shared/paint_tiles
 
-@group(0) @binding(6) var<storage, read> pixel_depths: array<PixelDepth>;
-@group(0) @binding(7) var<storage, read> gathered: array<u32>;
-@group(0) @binding(8) var<uniform> scene: SceneDepth;
-@group(0) @binding(9) var stored_depth: texture_2d<f32>;
+@group(0) @binding(7) var<storage, read> pixel_depths: array<PixelDepth>;
+@group(0) @binding(8) var<storage, read> gathered: array<u32>;
+@group(0) @binding(9) var<uniform> scene: SceneDepth;
+@group(0) @binding(10) var stored_depth: texture_2d<f32>;
 // Receives the depth at which half of the light is gone; 0 where more passes.
-@group(0) @binding(10) var median_depth: texture_storage_2d<r32float, write>;
+@group(0) @binding(11) var median_depth: texture_storage_2d<r32float, write>;
+
+const SIDE: u32 = SORTED_TILE;
+const COLUMN: u32 = 1u;
 
 override tests_depth: bool = false;
 override tells_depth: bool = false;
@@ -20,15 +23,26 @@ override is_parallel: bool = false;
 // A window of 32 splats instead of 16.
 override is_wide: bool = false;
 
-// 2 ln 2: r² of u² + v² in a brush's axes.
+struct Pixel {
+  color: vec3f,
+  transmittance: f32,
+  // Transmittance to which no splat may take the pixel, or behind which none is blended; once that has come, or there is nothing to paint, FINISHED.
+  least: f32,
+}
+alias Pixels = Pixel;
+
+// No splat leaves more.
+const FINISHED = 2.0;
+
+// 2 ln 2: r² of u² + v² in the axes of a batch.
 const RADIUS_2 = 1.3862943611198906;
 // Least 1 / depth.
 const NEARNESS_MIN = 1e-30;
 
 // Of the splats of the batch, and of the one that takes the place of a missing one: 1 / depth (depth, where rays are parallel) at the tile's corner, and by which it grows
 // across and down.
-var<workgroup> nearness: array<f32, TILE_THREADS + 1u>;
-var<workgroup> slopes: array<vec2f, TILE_THREADS + 1u>;
+var<workgroup> nearness: array<f32, BATCH + 1u>;
+var<workgroup> slopes: array<vec2f, BATCH + 1u>;
 
 // Depth from which steps are counted, as the bits of a float32, and the bits of such a number that a step leaves out.
 var<private> first_depth: u32;
@@ -78,7 +92,7 @@ fn shared_exponent_color(bits: u32) -> vec3f {
   return steps * bitcast<f32>(((bits >> 27u) + 103u) << 23u);
 }
 
-// The colour, and how the splat bends, in the axes of the brush.
+// The color, and how the splat bends, in the axes of the batch.
 fn packed_color(s: ProjectedSplat, slot: u32) -> vec2u {
   return vec2u(shared_exponent(splat_color(s)), bitcast<u32>(RADIUS_2 * pixel_depths[slot].bend));
 }
@@ -89,12 +103,18 @@ fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
   nearness[k] = d.nearness - dot(d.slope, s.shape.xy - tile_corner);
 }
 
-fn start_pixel(pixel: vec2u) {
+fn start_pixels(pixel: vec2u) -> Pixel {
+  if (any(vec2f(pixel) >= view.viewport)) { return Pixel(vec3f(0.0), 1.0, FINISHED); }
   let margin = MARGIN_OCTAVES << OCTAVE_BITS;
   first_depth = max(~gathered[NEAREST_INVERTED], margin) - margin;
   let range = max(gathered[FARTHEST] + margin, first_depth) - first_depth;
   step_bits = max(32u - min(countLeadingZeros(range), 32u), DEPTH_BITS) - DEPTH_BITS;
   if (tests_depth) { limit = depth_limit(scene, textureLoad(stored_depth, vec2u((vec2f(pixel) + 0.5) * scene.scale), 0).r); }
+  return Pixel(vec3f(0.0), 1.0, view.transmittance_min);
+}
+
+fn are_finished(pixel: Pixel) -> bool {
+  return pixel.least >= FINISHED;
 }
 
 fn depth_of(key: u32) -> f32 {
@@ -103,21 +123,22 @@ fn depth_of(key: u32) -> f32 {
 
 // Splat k of the batch at a pixel.
 fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
-  let brush = brushes[k];
-  let u = brush.u_x * place.x + brush.u_0;
-  let v = brush.v_x * place.x + (brush.v_y * place.y + brush.v_0);
+  let axis = axes[k];
+  let paint = paints[k];
+  let u = axis.x * place.x + axis.y;
+  let v = axis.z * place.x + (axis.w * place.y + bitcast<f32>(paint.x));
   let radius_2 = u * u + v * v;
-  let power = brush.power - radius_2;
+  let power = bitcast<f32>(paint.y) - radius_2;
   let slope = slopes[k];
   let linear = nearness[k] + (slope.x * place.x + slope.y * place.y);
   var depth = max(linear, 0.0);
   // Behind the camera nothing is densest: then the splat surrounds it.
-  if (!is_parallel) { depth = select(max(1.0 - bitcast<f32>(brush.color.y) * radius_2, 0.0) / max(linear, NEARNESS_MIN), 0.0, linear <= 0.0); }
+  if (!is_parallel) { depth = select(max(1.0 - bitcast<f32>(paint.w) * radius_2, 0.0) / max(linear, NEARNESS_MIN), 0.0, linear <= 0.0); }
   let steps = min((max(bitcast<u32>(depth), first_depth) - first_depth) >> step_bits, DEPTH_MASK);
   let alpha = min(ALPHA_MAX, exp2(power));
   let key = (steps << ALPHA_BITS) | whole(alpha * f32(ALPHA_MASK));
   let is_seen = power >= least_power && (!tests_depth || depth <= limit);
-  return vec2u(select(0u, key, is_seen), brush.color.x);
+  return vec2u(select(0u, key, is_seen), paint.z);
 }
 
 // Puts pairs in order, four at once: the nearer of each into the first.
@@ -215,7 +236,7 @@ fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
   let remaining = before - full_weight;
   let ends = remaining <= (*pixel).least;
   var refuses = ends;
-  if (!refuses_last) { refuses = remaining <= REFUSED || is_finished(*pixel); }
+  if (!refuses_last) { refuses = remaining <= REFUSED || are_finished(*pixel); }
   (*pixel).least = select((*pixel).least, FINISHED, ends);
   let after = select(remaining, before, refuses);
   if (tells_depth && before > 0.5 && after <= 0.5) { half_depth = depth_of(key); }
@@ -266,7 +287,7 @@ fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, least_
   var walk = Walk(0u, 0u);
   loop {
     find_next(&walk, own_block);
-    if (walk.ahead == 0u || is_finished(*pixel)) { break; }
+    if (walk.ahead == 0u || are_finished(*pixel)) { break; }
     var p = next_four(&walk, own_block, place, least_power);
     var q = next_four(&walk, own_block, place, least_power);
     sort_eight(&p, &q);
@@ -286,7 +307,8 @@ fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, least_
   }
 }
 
-fn paint_rest(pixel: ptr<function, Pixel>) {
+fn finish_pixels(pixel: ptr<function, Pixel>, position: vec2u) {
+  if (any(vec2f(position) >= view.viewport)) { return; }
   blend_four(pixel, window_0);
   blend_four(pixel, window_1);
   blend_four(pixel, window_2);
@@ -297,11 +319,9 @@ fn paint_rest(pixel: ptr<function, Pixel>) {
     blend_four(pixel, window_6);
     blend_four(pixel, window_7);
   }
+  if (tells_depth) { textureStore(median_depth, position, vec4f(half_depth)); }
+  store_pixel(position, (*pixel).color, (*pixel).transmittance);
 }
 
 fn clear_notes(lane: u32) {}
 fn keep_notes(k: u32) {}
-
-fn note_pixel(pixel: vec2u) {
-  if (tells_depth) { textureStore(median_depth, pixel, vec4f(half_depth)); }
-}

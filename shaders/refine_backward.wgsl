@@ -1,41 +1,31 @@
 // From the pixels of a picture back to the splats that painted it: how the squared error to another picture changes with their colours and ellipses. One workgroup for each
-// tile of 16 x 16 pixels and one thread a pixel, front to back as the tiles were painted: what lies behind a splat is the finished colour without what was painted so far,
-// so that nothing need be kept. Derivatives are summed in fixed point, over the pixels of a tile and then over the tiles: in whichever order tiles come, the sums are the same,
+// patch of 16 x 16 pixels of a tile and one thread a pixel, front to back as the tiles were painted: what lies behind a splat is the finished colour without what was painted so far,
+// so that nothing need be kept. Derivatives are summed in fixed point, over the pixels of a patch and then over the patches: in whichever order they come, the sums are the same,
 // and none waits for another or tries again.
-#import shared/bins
-#import shared/coverage
-#import shared/bits
+#import shared/tile_list
 #import shared/refined
 
-@group(0) @binding(0) var<uniform> view: BinView;
-@group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
-// Slots: bin by bin, in depth order.
-@group(0) @binding(2) var<storage, read> pairs: array<u32>;
-@group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
-// Numbers of the splats by slot.
-@group(0) @binding(4) var<storage, read> survivors: array<u32>;
 // Premultiplied red, green, blue and alpha.
 @group(0) @binding(5) var image: texture_2d<f32>;
 @group(0) @binding(6) var reference: texture_2d<f32>;
 // SCREEN_NUMBERS of each splat, two words each: see `of_fixed`.
 @group(0) @binding(7) var<storage, read_write> screen: array<atomic<i32>>;
-// Which pairs touch which tile: see tile_word.
-@group(0) @binding(8) var<storage, read> tile_bits: array<u32>;
+// Numbers of the splats by slot.
+@group(0) @binding(8) var<storage, read> survivors: array<u32>;
 
-const TILE_THREADS = TILE * TILE;
-// Pairs that are looked at together.
-const PAIR_BATCH = 128u;
-const PAIR_BATCH_WORDS = PAIR_BATCH / 32u;
+// Side of a patch in pixels.
+const PATCH = 16u;
+// Splats of a batch.
+const BACKWARD_BATCH = 128u;
 // Larger differences of a channel count as if they were so large: outliers must not lead.
 const MOST_DIFFERENCE = 0.0625;
 // The largest number of steps that a pixel adds: 256 of them fit an i32.
 const MOST_FIXED = 8388607.0;
 
-var<workgroup> slots: array<u32, PAIR_BATCH>;
-var<workgroup> shapes: array<vec4f, PAIR_BATCH>;
-var<workgroup> paints: array<vec4u, PAIR_BATCH>;
-var<workgroup> hits: array<atomic<u32>, PAIR_BATCH_WORDS>;
-var<workgroup> sums: array<atomic<i32>, PAIR_BATCH * SCREEN_NUMBERS>;
+var<workgroup> slots: array<u32, BACKWARD_BATCH>;
+var<workgroup> shapes: array<vec4f, BACKWARD_BATCH>;
+var<workgroup> paints: array<vec4u, BACKWARD_BATCH>;
+var<workgroup> sums: array<atomic<i32>, BACKWARD_BATCH * SCREEN_NUMBERS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
 
@@ -43,7 +33,7 @@ fn add_fixed(k: u32, number: u32, value: f32) {
   atomicAdd(&sums[k * SCREEN_NUMBERS + number], i32(clamp(round(value * FIXED), -MOST_FIXED, MOST_FIXED)));
 }
 
-// What a tile has summed up: at most 65,536 of them fit.
+// What a patch has summed up: at most 65,536 of them fit.
 fn add_words(at: u32, sum: i32) {
   atomicAdd(&screen[2u * at], sum & 0xffff);
   atomicAdd(&screen[2u * at + 1u], sum >> 16u);
@@ -59,7 +49,14 @@ struct Pixel {
   is_finished: bool,
 }
 
-// As `blend` of paint_tiles, and what the pixel tells of splat k of the batch.
+fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
+  slots[k] = slot;
+  let s = splats[slot];
+  shapes[k] = s.shape;
+  paints[k] = s.paint;
+}
+
+// As `blend` of paint_columns, and what the pixel tells of splat k of the batch.
 fn unblend(pixel: ptr<function, Pixel>, k: u32) {
   let shape = shapes[k];
   let offset = (*pixel).place - shape.xy;
@@ -100,12 +97,12 @@ fn unblend(pixel: ptr<function, Pixel>, k: u32) {
 
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let tile = workgroup_id.xy;
-  let position = tile * TILE + vec2u(lane % TILE, lane / TILE);
+  let corner = workgroup_id.xy * PATCH;
+  let position = corner + vec2u(lane % PATCH, lane / PATCH);
+  let tile = corner / TILE;
   let bin = tile / vec2u(BIN_COLUMNS, BIN_ROWS);
   let in_bin = tile % vec2u(BIN_COLUMNS, BIN_ROWS);
   let tile_in_bin = in_bin.y * BIN_COLUMNS + in_bin.x;
-  let range = ranges[bin.y * view.bins.x + bin.x];
 
   var pixel = Pixel(vec2f(position) + 0.5, vec3f(0.0), vec3f(0.0), 1.0, true);
   if (all(position < textureDimensions(reference))) {
@@ -115,34 +112,20 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     pixel.slope = 2.0 * clamp(painted - expected.xyz, vec3f(-MOST_DIFFERENCE), vec3f(MOST_DIFFERENCE));
     pixel.behind = painted;
   }
-  for (var first = range.x; first < range.y; first += PAIR_BATCH) {
-    if (lane < PAIR_BATCH_WORDS) { atomicStore(&hits[lane], 0u); }
+  var list = begin_list(bin.y * view.bins.x + bin.x);
+  loop {
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
-    for (var k = lane; k < PAIR_BATCH * SCREEN_NUMBERS; k += TILE_THREADS) { atomicStore(&sums[k], 0); }
+    for (var k = lane; k < BACKWARD_BATCH * SCREEN_NUMBERS; k += TILE_THREADS) { atomicStore(&sums[k], 0); }
+    let count = load_batch(&list, BACKWARD_BATCH, tile_in_bin, vec2f(corner), lane);
+    if (count == 0u) { break; }
     workgroupBarrier();
-    if (lane < PAIR_BATCH && first + lane < range.y) {
-      let pair = first + lane;
-      let touching = tile_bits[tile_word(pair / 32u, tile_in_bin)];
-      if (((touching >> (pair % 32u)) & 1u) != 0u) {
-        let slot = pairs[pair];
-        let s = splats[slot];
-        slots[lane] = slot;
-        shapes[lane] = s.shape;
-        paints[lane] = s.paint;
-        atomicOr(&hits[lane / 32u], 1u << (lane % 32u));
-      }
-    }
-    workgroupBarrier();
-    for (var word = 0u; word < PAIR_BATCH_WORDS; word++) {
-      var ahead = atomicLoad(&hits[word]);
-      while (ahead > 0u && !pixel.is_finished) {
-        unblend(&pixel, word * 32u + zeros_below(ahead));
-        ahead &= ahead - 1u;
-      }
+    for (var k = 0u; k < count; k++) {
+      if (pixel.is_finished) { break; }
+      unblend(&pixel, k);
     }
     if (!pixel.is_finished) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
-    if (lane < PAIR_BATCH && (atomicLoad(&hits[lane / 32u]) & (1u << (lane % 32u))) != 0u) {
+    if (lane < count) {
       let at = SCREEN_NUMBERS * survivors[slots[lane]];
       for (var number = 0u; number < SCREEN_NUMBERS; number++) {
         let sum = atomicLoad(&sums[lane * SCREEN_NUMBERS + number]);

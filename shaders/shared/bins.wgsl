@@ -1,12 +1,11 @@
-// Two scales of screen tiles. A bin is a block of 8 x 4 tiles of 16 x 16 pixels: splats are listed for each bin, in depth
-// order, and a mask of 32 bits says which of the bin's tiles each of them touches.
-// Side of a tile, in pixels.
-const TILE = 16u;
+// Two scales of screen tiles. A bin is a block of 8 x 4 tiles: splats are listed for each bin, in depth order, and a mask of 32 bits says which of the bin's
+// tiles each of them touches.
+// Side of a tile in pixels; and where each pixel sorts splats by itself, which takes more registers.
+const TILE = 32u;
+const SORTED_TILE = 16u;
 const BIN_COLUMNS = 8u;
 const BIN_ROWS = 4u;
 const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;
-const BIN_WIDTH = BIN_COLUMNS * TILE;
-const BIN_HEIGHT = BIN_ROWS * TILE;
 
 // Words of 32 bits with a bit for each of the 256 pairs that lie together in `tile_bits`.
 const PAIR_WORDS = 8u;
@@ -28,8 +27,9 @@ struct BinView {
   pair_capacity: u32,
   // Groups of 256 splats that there is room for.
   splat_groups: u32,
-  // First tile, across and down, of the part of the image that is painted: a frame with much to do is painted part by part.
-  first_tile: vec2u,
+  // A frame with much to do is painted in several parts: of every `parts` tiles, the one with the number `part`.
+  part: u32,
+  parts: u32,
   // A pixel is finished before a splat that would take its transmittance to this or below.
   transmittance_min: f32,
 }

@@ -118,7 +118,7 @@ const crowd = cloudOf(
     color: [(i % 7) / 7, (i % 5) / 5, (i % 3) / 3],
   })),
 );
-const crowdCamera = cameraAt([0, 0, -3], [0, 0, 0], { width: 320, height: 180 });
+const crowdCamera = cameraAt([0, 0, -3], [0, 0, 0], { width: 64, height: 1100 });
 
 test('tiles: over capacity the farthest pairs are left out, the frame says so, and the next one has room', async () => {
   const device = await anyDevice();
@@ -126,7 +126,7 @@ test('tiles: over capacity the farthest pairs are left out, the frame says so, a
   let told: () => void = () => undefined;
   const incomplete = new Promise<void>((resolve) => (told = resolve));
   const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => told() });
-  const target = device.createTexture({ size: [320, 180], format: 'rgba16float', usage: 0x8 | 0x10 });
+  const target = device.createTexture({ size: [64, 1100], format: 'rgba16float', usage: 0x8 | 0x10 });
   renderer.render({ gaussians, camera: crowdCamera, target });
   const first = await renderer.statistics();
   assert.deepEqual([first.pairs, first.pairOverflow], [65_536, 72_000 - 65_536]);
@@ -145,16 +145,16 @@ for (const [what, cameras, pauseMs] of [
   [
     'larger',
     [
-      { width: 32, height: 18 },
-      { width: 320, height: 180 },
+      { width: 32, height: 64 },
+      { width: 64, height: 1100 },
     ],
     0,
   ],
   [
     'after a pause',
     [
-      { width: 320, height: 180, far: true },
-      { width: 320, height: 180 },
+      { width: 64, height: 1100, far: true },
+      { width: 64, height: 1100 },
     ],
     300,
   ],

@@ -32,8 +32,8 @@ test('ten times the room, at once', async () => {
       color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)],
     })),
   );
-  // 8 x 8 bins of 128 x 64 pixels, or 4 x 4.
-  const [width, height] = sized([512, 256], [1024, 512]);
+  // 8 x 8 bins of 256 x 128 pixels, or 4 x 4.
+  const [width, height] = sized([1024, 512], [2048, 1024]);
   const block = width / 64;
   const camera = cameraAt([0, 0, -1], [0, 0, 0], { width, height });
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));

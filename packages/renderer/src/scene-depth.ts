@@ -1,18 +1,11 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import { rasterizeQuadsDepth, rasterizeTilesDepth } from './generated/depth-shaders.js';
-import { layouts } from './generated/shaders.js';
-import {
-  BUFFER_USAGE,
-  perDevice,
-  SHADER_STAGE,
-  ShaderProgram,
-  TEXTURE_USAGE,
-  type ComputeKernel,
-  type Overrides,
-} from './gpu/kernel.js';
+import { constants, layouts } from './generated/shaders.js';
+import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Overrides } from './gpu/kernel.js';
 import { writeStruct } from './gpu/struct.js';
 import type { AuxiliaryOutputs, PaintingDepth, QuadsWithDepth, RasterizerName } from './rasterizers/rasterizer.js';
-import { rasterizeKernel, type RasterizeKernel, type RasterizeVariant } from './rasterizers/tile-kernels.js';
+import { rasterizeKernel } from './rasterizers/tile-kernels.js';
+import { BoundImages, type TilePainter } from './rasterizers/tile-painter.js';
 
 /** Depth that a host has drawn, for splats to be hidden by. */
 export interface HostDepth {
@@ -61,7 +54,7 @@ export class SceneDepth implements PaintingDepth {
   readonly #out: GPUTextureView;
   readonly #uniform: GPUBuffer;
   readonly #bytes = new ArrayBuffer(layouts.SceneDepth.size);
-  #tiles: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
+  readonly #tiles = new BoundImages();
   #quads: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
 
   /** @throws GaussianSplatError `argument/value` for a texture that cannot be read or written. */
@@ -101,17 +94,12 @@ export class SceneDepth implements PaintingDepth {
     return { scene: this.#uniform, stored_depth: this.#stored, median_depth: this.#out };
   }
 
-  tilesKernel(variant: RasterizeVariant): RasterizeKernel {
-    return rasterizeKernel(this.#device, variant, rasterizeTilesDepth, this.overrides) as unknown as RasterizeKernel;
-  }
-
-  bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup {
-    const key = [kernel, depths, ...Object.values(painted)];
-    if (!isSame(this.#tiles?.key, key)) {
-      const deep = kernel as unknown as ComputeKernel<typeof rasterizeTilesDepth>;
-      this.#tiles = { key, group: deep.bind({ ...painted, depths, ...this.resources }) };
-    }
-    return this.#tiles!.group;
+  painter(depths: GPUBuffer): TilePainter {
+    return {
+      tile: constants.TILE,
+      kernel: (variant) => rasterizeKernel(this.#device, rasterizeTilesDepth, variant, this.overrides),
+      bind: (kernel, painted) => this.#tiles.bind(kernel, painted, { depths, ...this.resources }),
+    };
   }
 
   get quadsProgram(): QuadsWithDepth {

@@ -7,7 +7,7 @@ import { QueueClock } from './gpu/queue-clock.js';
  */
 const BUDGET_MS = 60;
 /** Milliseconds that a pair of splat and bin is taken to cost on a device of which nothing is known yet: a slow one. */
-const UNKNOWN_COST = 0.25e-3;
+const UNKNOWN_COST = 0.5e-3;
 /** Pairs under which what a frame takes says little about what a pair costs. */
 const TELLING_PAIRS = 1 << 16;
 /** Share of the last cost that is believed at least: one look at an easy view, or one hold-up elsewhere, does not decide. */

@@ -15,6 +15,7 @@ import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
 import type { AuxiliaryFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
+import { AuxiliaryPainter } from './rasterizers/tile-painter.js';
 import { TilesRasterizer } from './rasterizers/tiles.js';
 import { requireBlendable, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
@@ -103,6 +104,8 @@ export class UncheckedViewpoint {
   /** By size, the one used last at the end. */
   readonly #accumulations = new Map<string, Accumulation>();
   #mostSizes = 1;
+  /** Of the last frame with auxiliary outputs. */
+  #auxiliary: AuxiliaryPainter | undefined;
   /** Whether the last frame had to do without the code for its order. */
   #lacksOrder = false;
   /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
@@ -156,7 +159,7 @@ export class UncheckedViewpoint {
 
   /** What the last frame with auxiliary outputs was painted from; undefined before there is one. */
   get auxiliary(): AuxiliaryFrame | undefined {
-    return this.#engine.rasterizer.auxiliary;
+    return this.#auxiliary?.frame;
   }
 
   /**
@@ -169,7 +172,7 @@ export class UncheckedViewpoint {
     const all = settings.map((each) => this.resolve(each));
     for (const levers of all) {
       const order = levers.order === 'pixel' ? orderOn(this.#device).now : undefined;
-      rasterizer.prepare(levers, targetFormat, order?.paintingOf(levers));
+      rasterizer.prepare(levers, targetFormat, order?.painter(levers));
     }
     const isSmaller = all.some(({ resolutionScale }) => resolutionScale < 1);
     if (isSmaller) this.#compose.prepare(targetFormat, rasterizer.finishes(targetFormat));
@@ -272,9 +275,7 @@ export class UncheckedViewpoint {
       isWhole: isWhole(levers, this.resolvedSettings),
     });
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
-    const depths = depth && !order ? scratch.depths : undefined;
-    const ordered = order?.paintingOf(levers, camera, scratch);
-    const how = { levers, auxiliary, survivors: auxiliary && scratch.survivors, timer, depth, depths, ordered };
+    const how = { levers, timer, ...this.#wayToPaint(picture, levers, drawn, scratch, order) };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);
     this.#last = { scratch, scale: drawn.width / camera.width };
     return { last, isWatched, submissions, wishes, resources };
@@ -368,7 +369,7 @@ export class UncheckedViewpoint {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'levers' | 'auxiliary' | 'survivors' | 'timer' | 'depth' | 'depths' | 'ordered'>,
+    how: Pick<Painting, 'levers' | 'timer' | 'depth' | 'depths' | 'painter'>,
     { over, colours }: FrameTarget,
     submissions: Submissions,
   ): GPUCommandEncoder {
@@ -405,6 +406,22 @@ export class UncheckedViewpoint {
   #submit(encoder: GPUCommandEncoder, { watch }: Submissions): void {
     this.#device.queue.submit([encoder.finish()]);
     watch?.note();
+  }
+
+  /** How tiles, or quads, are painted that meet more than splats. */
+  #wayToPaint(
+    { depth, auxiliary }: FrameTarget,
+    levers: RenderSettings,
+    camera: Camera,
+    scratch: Scratch,
+    order: PixelOrder | undefined,
+  ): Pick<Painting, 'depth' | 'depths' | 'painter'> {
+    if (order) return { painter: order.painter(levers, camera, scratch, depth) };
+    if (depth) return { depth, depths: scratch.depths, painter: depth.painter(scratch.depths) };
+    if (!auxiliary) return {};
+    const painter = new AuxiliaryPainter(this.#device, auxiliary, scratch.survivors);
+    this.#auxiliary = painter;
+    return { painter };
   }
 
   /** Records the painting, in several submissions where that is asked for. @returns the encoder to go on with */

@@ -3,13 +3,13 @@ import type { Renderer } from '@gaussian-splat/renderer';
 import {
   BUFFER_USAGE,
   cameraValues,
-  constants,
   GpuMemory,
   layouts as rendererLayouts,
   rareKernelOf,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
 import {
+  PATCH,
   REFINE_GROUP,
   refineBackward,
   refineChain,
@@ -22,7 +22,6 @@ import type { PictureErrors } from '../gpu/picture-errors.js';
 import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';
 
-const { TILE } = constants;
 /** Bindings begin at multiples of 256 bytes. */
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 const SMALL_STRIDE = 256;
@@ -130,7 +129,7 @@ export class SceneFitter {
     const painted = { view: tiles, splats, pairs, tile_bits, ranges, survivors };
     const pictures = { image: image.createView(), reference: reference.createView() };
     const bindings = backward.bind({ ...painted, ...pictures, screen: this.#scene.screen });
-    backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / TILE), Math.ceil(camera.height / TILE));
+    backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / PATCH), Math.ceil(camera.height / PATCH));
     const chain = rareKernelOf(this.#device, refineChain);
     this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients, bends }, p) => {
       const place = this.#scene.parts.length * view + p;

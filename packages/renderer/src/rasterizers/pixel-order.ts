@@ -13,10 +13,10 @@ import {
 } from '../gpu/kernel.js';
 import type { RenderSettings } from '../render-settings.js';
 import type { Scratch } from '../scratch.js';
-import type { OrderedPainting, PaintingDepth } from './rasterizer.js';
-import { rasterizeKernel, type RasterizeKernel } from './tile-kernels.js';
+import type { PaintingDepth } from './rasterizer.js';
+import { rasterizeKernel } from './tile-kernels.js';
+import { BoundImages, type TilePainter } from './tile-painter.js';
 
-type Painted = Parameters<RasterizeKernel['bind']>[0];
 type DepthResources = PaintingDepth['resources'];
 
 /** See shaders/pixel_depths.wgsl and shaders/rasterize_tiles_order.wgsl. */
@@ -24,8 +24,7 @@ export class PixelOrder {
   readonly #device: GPUDevice;
   /** Of the pages that a frame shows. */
   readonly #pages = new WeakMap<FrameBindings, readonly Recorded[]>();
-  /** By the image. */
-  readonly #bound = new WeakMap<object, { readonly key: readonly unknown[]; readonly group: GPUBindGroup }>();
+  readonly #bound = new BoundImages();
 
   constructor(device: GPUDevice) {
     this.#device = device;
@@ -38,31 +37,29 @@ export class PixelOrder {
     for (const { kernel, group, groups } of pages) kernel.dispatch(pass, group, groups);
   }
 
-  /** @param scratch of the frame; undefined where only pipelines are wanted */
-  paintingOf(
+  /**
+   * @param scratch of the frame; undefined where only pipelines are wanted
+   * @param depth what the frame has to do with other depths
+   */
+  painter(
     { orderWindow }: Pick<RenderSettings, 'orderWindow'>,
     camera?: Camera,
     scratch?: Scratch,
-  ): OrderedPainting {
-    const own = { is_wide: +(orderWindow === 32), is_parallel: +(camera?.orthographic === true) };
+    depth?: PaintingDepth,
+  ): TilePainter {
+    const overrides = {
+      ...{ is_wide: +(orderWindow === 32), is_parallel: +(camera?.orthographic === true) },
+      ...depth?.overrides,
+    };
     return {
-      tilesKernel: (variant, depth) =>
-        rasterizeKernel(this.#device, variant, rasterizeTilesOrder, { ...own, ...depth?.overrides }),
-      bindTiles: (kernel, painted, depth) => this.#bindTiles(kernel, painted, scratch!, depth),
+      tile: constants.SORTED_TILE,
+      kernel: (variant) => rasterizeKernel(this.#device, rasterizeTilesOrder, variant, overrides),
+      bind: (kernel, painted) =>
+        this.#bound.bind(kernel, painted, {
+          ...{ pixel_depths: depthsIn(scratch!), gathered: scratch!.gathered },
+          ...(depth?.resources ?? noDepth(this.#device)),
+        }),
     };
-  }
-
-  #bindTiles(kernel: RasterizeKernel, painted: Painted, scratch: Scratch, depth?: PaintingDepth): GPUBindGroup {
-    const own = {
-      ...{ pixel_depths: depthsIn(scratch), gathered: scratch.gathered },
-      ...(depth?.resources ?? noDepth(this.#device)),
-    };
-    const key = [kernel, ...Object.values(painted), ...Object.values(own)];
-    const known = this.#bound.get(painted.image);
-    if (known?.key.every((value, k) => value === key[k])) return known.group;
-    const group = (kernel as unknown as ComputeKernel<typeof rasterizeTilesOrder>).bind({ ...painted, ...own });
-    this.#bound.set(painted.image, { key, group });
-    return group;
   }
 
   #bindPages({ table, scratch }: FrameBindings): Recorded[] {

@@ -2,7 +2,7 @@ import type { FrameTimer } from '../gpu/pass-timer.js';
 import type { Camera } from '@gaussian-splat/core';
 import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { RenderSettings } from '../render-settings.js';
-import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
+import type { TilePainter } from './tile-painter.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
@@ -78,23 +78,12 @@ export interface PaintingDepth {
     rasterizer: RasterizerName,
     auxiliary: AuxiliaryOutputs | undefined,
   ): void;
-  tilesKernel(variant: RasterizeVariant): RasterizeKernel;
-  bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
+  /** @param depths camera depths of the splats by slot */
+  painter(depths: GPUBuffer): TilePainter;
   readonly quadsProgram: QuadsWithDepth;
   /** What a shader that has depth among other things binds, and its overrides. */
   readonly resources: Readonly<Record<'scene', GPUBuffer> & Record<'stored_depth' | 'median_depth', GPUTextureView>>;
   readonly overrides: Overrides;
-}
-
-/** How tiles are painted that order splats pixel by pixel. */
-export interface OrderedPainting {
-  /** @param depth what the frame has to do with other depths */
-  tilesKernel(variant: RasterizeVariant, depth?: PaintingDepth): RasterizeKernel;
-  bindTiles(
-    kernel: RasterizeKernel,
-    painted: Parameters<RasterizeKernel['bind']>[0],
-    depth?: PaintingDepth,
-  ): GPUBindGroup;
 }
 
 /** Quads that read depths: what a pipeline is made of, and what is bound to it. */
@@ -112,9 +101,6 @@ export type PaintingLevers = Pick<RenderSettings, 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {
-  readonly auxiliary?: AuxiliaryOutputs | undefined;
-  /** Numbers of the visible splats by slot; with {@link auxiliary}. */
-  readonly survivors?: GPUBuffer | undefined;
   readonly surface: Surface;
   readonly levers: PaintingLevers;
   /**
@@ -123,11 +109,12 @@ export interface Painting {
    */
   readonly background?: readonly [number, number, number, number];
   readonly timer?: FrameTimer | undefined;
+  /** `quads` only: what the frame has to do with depth. */
   readonly depth?: PaintingDepth | undefined;
   /** Camera depths of the splats by slot; with {@link depth}. */
   readonly depths?: GPUBuffer | undefined;
-  /** `tiles` only. */
-  readonly ordered?: OrderedPainting | undefined;
+  /** `tiles` only: how tiles are painted where not plainly. */
+  readonly painter?: TilePainter | undefined;
 }
 
 /** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */
@@ -146,8 +133,6 @@ export interface Rasterizer {
   readonly byteLength: number;
   /** `Plan` of the pairs of splat and bin, where there are pairs. */
   readonly pairPlan?: GPUBuffer;
-  /** What the last frame with auxiliary outputs was painted from. */
-  readonly auxiliary?: AuxiliaryFrame;
   /** True if the rasterizer can write a final image of this format by itself. */
   finishes(format: GPUTextureFormat): boolean;
   /** Bytes of each buffer of {@link RasterizerInputs.spare} that it needs. */
@@ -155,7 +140,7 @@ export interface Rasterizer {
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Makes the pipelines for other settings, so that no frame has to. @param format of the targets */
-  prepare(levers: PaintingLevers, format: GPUTextureFormat, ordered?: OrderedPainting): void;
+  prepare(levers: PaintingLevers, format: GPUTextureFormat, painter?: TilePainter): void;
   /** Records what the parts of one frame have in common, before the first of them. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
   /** Records the drawing of one part of one frame. Parts of a frame are submitted one by one. */

@@ -1,5 +1,5 @@
 /** The pipelines of the rasterizer `tiles`. */
-import { binCount, binEmit, binIndex, binPlan, rasterizeTiles, rasterizeTilesNoting } from '../generated/shaders.js';
+import { binCount, binEmit, binIndex, binOrder, binPlan, type rasterizeTiles } from '../generated/shaders.js';
 import {
   ComputeKernel,
   kernelOf,
@@ -15,38 +15,42 @@ export interface ListingKernels {
   readonly plan: ComputeKernel<typeof binPlan>;
   readonly emit: ComputeKernel<typeof binEmit>;
   readonly index: ComputeKernel<typeof binIndex>;
+  readonly order: ComputeKernel<typeof binOrder>;
 }
 
-export function listingKernels(device: GPUDevice): ListingKernels {
+/** @param tile side of a tile, pixels */
+export function listingKernels(device: GPUDevice, tile: number): ListingKernels {
+  const side = { tile_side: tile };
   return {
-    count: kernelOf(device, binCount),
+    count: kernelOf(device, binCount, side),
     plan: kernelOf(device, binPlan),
     emit: kernelOf(device, binEmit),
-    index: kernelOf(device, binIndex),
+    index: kernelOf(device, binIndex, side),
+    order: kernelOf(device, binOrder),
   };
 }
 
-/** Paints tiles. The one that notes has more bindings: see `rasterize_tiles_noting`. */
+/** Paints tiles. Most have more bindings than `rasterize_tiles`. */
 export type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
 
-/** What one pipeline of `rasterize_tiles` is made for. */
+/** What every kernel that paints tiles binds. */
+export type PaintedTiles = Parameters<RasterizeKernel['bind']>[0] & { readonly image: GPUTextureView };
+
+/** What one pipeline is made for. */
 export interface RasterizeVariant {
   readonly format: GPUTextureFormat;
   readonly isFinal: boolean;
-  readonly isNoting: boolean;
   /** See `transmittanceMin` of the settings. */
   readonly refusesLast: boolean;
 }
 
-/** The pipeline for a variant; made once for each device. */
+/** The pipeline of a shader for a variant; made once for each device. */
 export function rasterizeKernel(
   device: GPUDevice,
-  variant: RasterizeVariant,
-  other?: ShaderDescription,
+  shader: ShaderDescription,
+  { format, isFinal, refusesLast }: RasterizeVariant,
   overrides: Overrides = {},
 ): RasterizeKernel {
-  const { format, isFinal, isNoting, refusesLast } = variant;
-  const shader = (other ?? (isNoting ? rasterizeTilesNoting : rasterizeTiles)) as typeof rasterizeTiles;
   const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
   const constants = {
     ...{ refuses_last: +refusesLast, is_final: +isFinal },
@@ -54,5 +58,6 @@ export function rasterizeKernel(
     ...overrides,
   };
   const key = `${shader.name} ${format} ${JSON.stringify(constants)}`;
-  return perDevice(device, key, () => new ComputeKernel(device, storingInto(shader, format), constants));
+  const code = shader as typeof rasterizeTiles;
+  return perDevice(device, key, () => new ComputeKernel(device, storingInto(code, format), constants));
 }

@@ -1,5 +1,5 @@
-import { constants, layouts, type rasterizeTilesNoting } from '../generated/shaders.js';
-import { BUFFER_USAGE, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
+import { constants, layouts } from '../generated/shaders.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
@@ -7,28 +7,18 @@ import type { Threads } from '../stages/plan.js';
 import { TRAINED_TRANSMITTANCE } from '../render-settings.js';
 import type {
   AccumulationFormat,
-  AuxiliaryOutputs,
-  AuxiliaryFrame,
-  OrderedPainting,
   Painting,
   PaintingLevers,
   Rasterizer,
   RasterizerInputs,
   Room,
   Slice,
-  Surface,
 } from './rasterizer.js';
 import { pairBuffers, spareBytesOf, type PairBuffers } from './pair-buffers.js';
-import {
-  listingKernels,
-  rasterizeKernel,
-  type ListingKernels,
-  type RasterizeKernel,
-  type RasterizeVariant,
-} from './tile-kernels.js';
-import { sliceOfTiles } from './tile-slice.js';
+import { listingKernels, type ListingKernels, type PaintedTiles, type RasterizeVariant } from './tile-kernels.js';
+import { PlainPainter, type TilePainter } from './tile-painter.js';
 
-const { BIN_WIDTH, BIN_HEIGHT, PREFIX_THREADS, PROJECT_GROUP, TILE } = constants;
+const { BIN_COLUMNS, BIN_ROWS, PREFIX_THREADS, PROJECT_GROUP, TILES_PER_BIN } = constants;
 
 const groupsOf = (splats: number): number => Math.ceil(splats / PREFIX_THREADS);
 
@@ -39,17 +29,19 @@ interface Grid {
   readonly bits: number;
 }
 
-/** What is bound for one scene and one number of bins. */
+/** What is bound for one scene, one number of bins and one size of tiles. */
 interface GridBindings {
   readonly grid: Grid;
+  readonly kernels: ListingKernels;
   readonly ranges: GPUBuffer;
+  /** The bins in the order in which they are painted. */
+  readonly binOrder: GPUBuffer;
   readonly count: GPUBindGroup;
   readonly emit: GPUBindGroup;
   readonly plan: GPUBindGroup;
   readonly sort: SortBindings;
   readonly index: GPUBindGroup;
-  /** By the view of the image. */
-  readonly rasterize: WeakMap<GPUTextureView, GPUBindGroup>;
+  readonly order: GPUBindGroup;
 }
 
 /** Formats of images that a compute shader may write without an optional feature, and the one that asks for one. */
@@ -65,9 +57,8 @@ const refusesLast = ({ transmittanceMin }: PaintingLevers): boolean => transmitt
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
- * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 128 x 64 pixels: counted,
- * written, and sorted by bin with a stable sort that keeps the depth order. Tiles of 16 x 16 pixels then walk their bin's
- * list front to back and stop when all their pixels are opaque.
+ * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 8 x 4 tiles: counted, written, and sorted by bin with a stable sort that keeps
+ * the depth order. Tiles then walk their bin's list front to back, those of the longest lists first, and stop when all their pixels are opaque.
  *
  * Pairs beyond the room for them belong to the farthest splats; they are left out.
  */
@@ -76,24 +67,21 @@ export class TilesRasterizer implements Rasterizer {
   readonly #device: GPUDevice;
   readonly #accumulation: AccumulationFormat;
   readonly #memory: GpuMemory;
-  /** Their bind groups fit those of other settings. */
-  readonly #kernels: ListingKernels;
+  readonly #plain: TilePainter;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
-  /** By the number of bins across and down: pictures in motion may have fewer pixels. */
+  /** By the size of tiles and the number of bins across and down: images in motion may have fewer pixels. */
   readonly #bound = new Map<string, GridBindings>();
-  /** Where auxiliary outputs go that no caller asked for. */
-  #nowhere: Required<AuxiliaryOutputs> | undefined;
-  #noted: AuxiliaryFrame | undefined;
 
   constructor(device: GPUDevice, accumulation: AccumulationFormat, threads: Threads) {
     this.#device = device;
     this.#accumulation = accumulation;
     this.#memory = new GpuMemory(device);
-    this.#kernels = listingKernels(device);
+    this.#plain = new PlainPainter(device);
+    listingKernels(device, this.#plain.tile);
     this.#sort = new SortStage(device, threads, 'given');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
@@ -105,10 +93,6 @@ export class TilesRasterizer implements Rasterizer {
 
   get pairPlan(): GPUBuffer | undefined {
     return this.#buffers?.plan;
-  }
-
-  get auxiliary(): AuxiliaryFrame | undefined {
-    return this.#noted;
   }
 
   finishes(format: GPUTextureFormat): boolean {
@@ -126,23 +110,23 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = pairBuffers(this.#memory, inputs);
   }
 
-  prepare(levers: PaintingLevers, format: GPUTextureFormat, ordered?: OrderedPainting): void {
-    const variant = { isNoting: false, refusesLast: refusesLast(levers) };
-    const prepare = (own: RasterizeVariant): unknown =>
-      (ordered?.tilesKernel(own) ?? rasterizeKernel(this.#device, own)).prepare();
-    if (this.finishes(format)) prepare({ ...variant, format, isFinal: true });
-    prepare({ ...variant, format: this.#accumulation, isFinal: false });
+  prepare(levers: PaintingLevers, format: GPUTextureFormat, painter: TilePainter = this.#plain): void {
+    listingKernels(this.#device, painter.tile);
+    const prepare = (own: Pick<RasterizeVariant, 'format' | 'isFinal'>): unknown =>
+      painter.kernel({ ...own, refusesLast: refusesLast(levers) }).prepare();
+    if (this.finishes(format)) prepare({ format, isFinal: true });
+    prepare({ format: this.#accumulation, isFinal: false });
   }
 
   /** Lists the splats for the bins. */
-  prepareFrame(encoder: GPUCommandEncoder, { surface, levers, background, timer }: Painting): void {
+  prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
-    const buffers = this.#buffers;
-    const bound = this.#gridFor(surface, this.#inputs, buffers);
-    this.#writeView(surface, bound.grid, [0, 0], levers, background);
+    const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
+    this.#writeView(painting, bound.grid, { index: 0, count: 1 });
 
-    const { count, plan, emit, index } = this.#kernels;
-    const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
+    const { count, plan, emit, index, order } = bound.kernels;
+    const timestampWrites = painting.timer?.timestampWrites('bin');
+    const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites });
     // As many as there is room for: groups beyond the splats and pairs that are there end at once.
     const groups = groupsOf(this.#inputs.capacity);
     count.dispatch(bin, bound.count, groups);
@@ -150,42 +134,33 @@ export class TilesRasterizer implements Rasterizer {
     emit.dispatch(bin, bound.emit, groups);
     this.#sort.record(bin, bound.sort, this.#inputs.pairCapacity);
     index.dispatch(bin, bound.index, Math.ceil(this.#inputs.pairCapacity / PROJECT_GROUP));
+    order.dispatch(bin, bound.order, 1);
     bin.end();
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, auxiliary, survivors, timer, depth, depths, ordered } = painting;
+    const { surface, levers, background, painter = this.#plain, timer } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
-    const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
-    const { format, width, height } = surface;
-    const { column, row, columns, rows } = sliceOfTiles(Math.ceil(width / TILE), Math.ceil(height / TILE), slice);
-    if (columns * rows === 0) return;
+    const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
+    // Every so many-th tile: the parts of a frame have long and short lists alike.
+    const tiles = bound.grid.columns * bound.grid.rows * TILES_PER_BIN;
+    const groups = Math.ceil((tiles - slice.index) / slice.count);
+    if (groups <= 0) return;
     // A whole frame has the view that its splats were listed with.
-    if (slice.count > 1) this.#writeView(surface, bound.grid, [column, row], levers, background);
+    if (slice.count > 1) this.#writeView(painting, bound.grid, slice);
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const variant = {
-      ...{ format, isFinal: background !== undefined, isNoting: auxiliary !== undefined },
+    const kernel = painter.kernel({
+      ...{ format: surface.format, isFinal: background !== undefined },
       refusesLast: refusesLast(levers),
-    };
-    const kernel =
-      ordered?.tilesKernel(variant, depth) ??
-      (depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant));
-    const image =
-      ordered?.bindTiles(kernel, this.#painted(bound, surface.view), depth) ??
-      (depth && depths
-        ? depth.bindTiles(kernel, this.#painted(bound, surface.view), depths)
-        : auxiliary && survivors
-          ? this.#bindNoting(kernel, bound, surface.view, { ...auxiliary, survivors })
-          : this.#imageBindings(kernel, bound, surface.view));
-    kernel.dispatchGrid(paint, image, columns, rows);
+    });
+    kernel.dispatch(paint, painter.bind(kernel, this.#painted(bound, surface.view)), groups);
     paint.end();
   }
 
   destroy(): void {
-    this.#nowhere?.depth.destroy();
     this.#memory.destroy();
   }
 
@@ -196,23 +171,34 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = undefined;
   }
 
-  #gridFor({ width, height }: Surface, inputs: RasterizerInputs, buffers: PairBuffers): GridBindings {
-    const columns = Math.ceil(width / BIN_WIDTH);
-    const rows = Math.ceil(height / BIN_HEIGHT);
-    const key = `${columns} x ${rows}`;
+  #gridFor(
+    { surface: { width, height }, painter = this.#plain }: Painting,
+    inputs: RasterizerInputs,
+    buffers: PairBuffers,
+  ): GridBindings {
+    const columns = Math.ceil(width / (BIN_COLUMNS * painter.tile));
+    const rows = Math.ceil(height / (BIN_ROWS * painter.tile));
+    const key = `${painter.tile} ${columns} ${rows}`;
     const known = this.#bound.get(key);
     if (known) return known;
     if (this.#bound.size >= MAX_GRIDS) this.#forgetGrids();
-    const bits = Math.ceil(Math.log2(columns * rows));
-    const { storage, copyDestination } = BUFFER_USAGE;
-    const ranges = this.#memory.buffer('gs.bin.ranges', 8 * columns * rows, storage | copyDestination);
-    const bound = { grid: { columns, rows, bits }, ranges, ...this.#bindings(inputs, buffers, bits, ranges) };
+    const bins = columns * rows;
+    const grid = { columns, rows, bits: Math.ceil(Math.log2(bins)) };
+    const own = {
+      kernels: listingKernels(this.#device, painter.tile),
+      ranges: this.#memory.buffer('gs.bin.ranges', 8 * bins, BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination),
+      binOrder: this.#memory.buffer('gs.bin.order', 4 * bins, BUFFER_USAGE.storage),
+    };
+    const bound = { grid, ...own, ...this.#bindings(inputs, buffers, grid.bits, own) };
     this.#bound.set(key, bound);
     return bound;
   }
 
   #forgetGrids(): void {
-    for (const { ranges } of this.#bound.values()) this.#memory.free(ranges);
+    for (const { ranges, binOrder } of this.#bound.values()) {
+      this.#memory.free(ranges);
+      this.#memory.free(binOrder);
+    }
     this.#bound.clear();
   }
 
@@ -220,11 +206,11 @@ export class TilesRasterizer implements Rasterizer {
     { plan, splats, order }: RasterizerInputs,
     { rects, groupPairs, plan: pairPlan, bins, pairs, digitCounts, digitTotals }: PairBuffers,
     bits: number,
-    ranges: GPUBuffer,
-  ): Omit<GridBindings, 'grid' | 'ranges'> {
+    { kernels, ranges, binOrder }: Pick<GridBindings, 'kernels' | 'ranges' | 'binOrder'>,
+  ): Omit<GridBindings, 'grid' | 'kernels' | 'ranges' | 'binOrder'> {
     const view = this.#view;
     const sorted = sortedIn(bits);
-    const { count, plan: planKernel, emit, index } = this.#kernels;
+    const { count, plan: planKernel, emit, index, order: orderKernel } = kernels;
     const shared = { view, plan, order, rects, group_pairs: groupPairs };
     return {
       count: count.bind({ ...shared, splats }),
@@ -238,19 +224,11 @@ export class TilesRasterizer implements Rasterizer {
         ranges,
         tile_bits: bins[1 - sorted]!,
       }),
-      rasterize: new WeakMap(),
+      order: orderKernel.bind({ view, ranges, bin_order: binOrder }),
     };
   }
 
-  #imageBindings(kernel: RasterizeKernel, bound: GridBindings, image: GPUTextureView): GPUBindGroup {
-    const known = bound.rasterize.get(image);
-    if (known) return known;
-    const made = kernel.bind(this.#painted(bound, image));
-    bound.rasterize.set(image, made);
-    return made;
-  }
-
-  #painted(bound: GridBindings, image: GPUTextureView) {
+  #painted(bound: GridBindings, image: GPUTextureView): PaintedTiles {
     const { splats } = this.#inputs!;
     const { pairs, bins } = this.#buffers!;
     const sorted = sortedIn(bound.grid.bits);
@@ -258,47 +236,22 @@ export class TilesRasterizer implements Rasterizer {
       view: this.#view,
       splats,
       pairs: pairs[sorted],
-      ranges: bound.ranges,
+      ...{ ranges: bound.ranges, bin_order: bound.binOrder },
       // Once the pairs are sorted, what they were sorted from is free.
       tile_bits: bins[1 - sorted]!,
       image,
     };
   }
 
-  /** Bound anew for each frame: auxiliary outputs are not for every frame. */
-  #bindNoting(
-    kernel: RasterizeKernel,
-    bound: GridBindings,
-    image: GPUTextureView,
-    { contributions, depth, survivors }: AuxiliaryOutputs & { readonly survivors: GPUBuffer },
-  ): GPUBindGroup {
-    this.#nowhere ??= {
-      contributions: this.#memory.buffer('gs.rasterize.no_contributions', 4, BUFFER_USAGE.storage),
-      depth: this.#device.createTexture({
-        label: 'gs.rasterize.no_depth',
-        size: [1, 1],
-        format: 'r32float',
-        usage: TEXTURE_USAGE.storageBinding,
-      }),
-    };
-    return (kernel as unknown as ComputeKernel<typeof rasterizeTilesNoting>).bind({
-      ...(this.#noted = { ...this.#painted(bound, image), survivors }),
-      contributions: contributions ?? this.#nowhere.contributions,
-      depths: (depth ?? this.#nowhere.depth).createView(),
-    });
-  }
-
   #writeView(
-    { width, height }: Surface,
+    { surface: { width, height }, levers, background = TRANSPARENT }: Painting,
     { columns, rows }: Grid,
-    first_tile: readonly [number, number],
-    { transmittanceMin }: PaintingLevers,
-    background: Painting['background'] = TRANSPARENT,
+    { index, count }: Slice,
   ): void {
     const { capacity, pairCapacity } = this.#inputs!;
     const room = { pair_capacity: pairCapacity, splat_groups: groupsOf(capacity) };
-    const image = { viewport: [width, height], bins: [columns, rows], background, first_tile };
-    writeStruct(layouts.BinView, { ...room, ...image, transmittance_min: transmittanceMin }, this.#viewBytes);
+    const image = { viewport: [width, height], bins: [columns, rows], background, part: index, parts: count };
+    writeStruct(layouts.BinView, { ...room, ...image, transmittance_min: levers.transmittanceMin }, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
 }

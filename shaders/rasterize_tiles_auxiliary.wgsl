@@ -1,0 +1,41 @@
+// Paints tiles, and notes what each splat contributed and how deep each pixel is.
+#import shared/paint_columns
+#import shared/median_depth
+
+// Numbers of the splats by slot.
+@group(0) @binding(7) var<storage, read> survivors: array<u32>;
+// By number: bits of the largest weight, alpha times transmittance, that the splat has had in any pixel of any frame.
+@group(0) @binding(8) var<storage, read_write> contributions: array<atomic<u32>>;
+// Camera depth, in world units, of the splat that leaves a pixel half transparent or less; 0 where none does.
+@group(0) @binding(9) var depths: texture_storage_2d<r32float, write>;
+
+// Slots of the splats of the batch.
+var<workgroup> slots: array<u32, BATCH>;
+// Largest weight of each splat of the batch, and of the one that stands for a missing one.
+var<workgroup> weights: array<atomic<u32>, BATCH + 1u>;
+
+fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
+  slots[k] = slot;
+  batch_depths[k] = splat_depth(s);
+}
+
+fn start_hiding(position: vec2u) {}
+fn hidden_by(light: Column, k: u32) -> Column { return light; }
+
+fn clear_notes(lane: u32) {
+  atomicStore(&weights[lane], 0u);
+}
+
+fn note_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {
+  atomicMax(&weights[k], bitcast<u32>(max(max(weight.x, weight.y), max(weight.z, weight.w))));
+  note_depth(k, before, after, is_blended);
+}
+
+fn keep_notes(k: u32) {
+  let number = survivors[slots[k]];
+  if (number < arrayLength(&contributions)) { atomicMax(&contributions[number], atomicLoad(&weights[k])); }
+}
+
+fn note_pixel(pixel: vec2u, row: u32) {
+  textureStore(depths, pixel, vec4f(half_depth[row]));
+}

@@ -1,0 +1,11 @@
+// The depth of a pixel: that of the splat at which half of the light is gone.
+#import shared/paint_columns
+
+// Of the splats of the batch, and of the one that stands for a missing one.
+var<workgroup> batch_depths: array<f32, BATCH + 1u>;
+var<private> half_depth: Column;
+
+fn note_depth(k: u32, before: Column, after: Column, is_blended: vec4<bool>) {
+  let is_half = is_blended & (before > Column(0.5)) & (after <= Column(0.5));
+  half_depth = select(half_depth, Column(batch_depths[k]), is_half);
+}

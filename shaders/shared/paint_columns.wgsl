@@ -1,0 +1,83 @@
+// How a column of four pixels takes the splats of a batch: as they are listed, by the depth of their centers. What a splat costs a thread, whatever the pixel, it costs once
+// for four. Whoever imports this says what hides splats (`start_hiding`, `hidden_by`) and what is noted on the way (`note_blend`, `note_pixel`).
+#import shared/paint_tiles
+
+const SIDE: u32 = TILE;
+const COLUMN: u32 = 4u;
+alias Column = vec4f;
+const STEPS = Column(0.0, 1.0, 2.0, 3.0);
+
+struct Pixels {
+  red: Column,
+  green: Column,
+  blue: Column,
+  // What passes all splats so far, and what passes those that were blended. They differ once a pixel is finished: the first goes on falling, so that the comparison that
+  // refuses a splat refuses all that come later.
+  light: Column,
+  transmittance: Column,
+}
+
+// Red and green in float16; blue in float32.
+fn packed_color(s: ProjectedSplat, slot: u32) -> vec2u {
+  return vec2u(s.paint.y, bitcast<u32>(splat_color(s).b));
+}
+
+fn start_pixels(position: vec2u) -> Pixels {
+  let is_inside = f32(position.x) < view.viewport.x;
+  let are_inside = vec4<bool>(is_inside) & (f32(position.y) + STEPS < Column(view.viewport.y));
+  if (is_inside) { start_hiding(position); }
+  let light = select(Column(0.0), Column(1.0), are_inside);
+  return Pixels(Column(0.0), Column(0.0), Column(0.0), light, light);
+}
+
+fn are_finished(pixels: Pixels) -> bool {
+  return all(pixels.light <= Column(view.transmittance_min));
+}
+
+// Blends splat k of the batch. Without a branch, which takes a third more time: where the splat does not reach, and where a pixel is finished, nothing is added.
+fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, least_power: f32) {
+  let axis = axes[k];
+  let paint = paints[k];
+  let u = axis.x * place.x + axis.y;
+  let v = axis.w * (place.y + STEPS) + (axis.z * place.x + bitcast<f32>(paint.x));
+  let power = (bitcast<f32>(paint.y) - u * u) - v * v;
+  let alpha = select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(least_power));
+  let before = hidden_by((*pixels).light, k);
+  let full_weight = before * alpha;
+  let after = before - full_weight;
+  var is_blended = after > Column(view.transmittance_min);
+  if (!refuses_last) { is_blended = (after > Column(REFUSED)) & (before > Column(view.transmittance_min)); }
+  let weight = select(Column(0.0), full_weight, is_blended);
+  let red_green = unpack2x16float(paint.z);
+  (*pixels).red += weight * red_green.x;
+  (*pixels).green += weight * red_green.y;
+  (*pixels).blue += weight * bitcast<f32>(paint.w);
+  (*pixels).light = after;
+  note_blend(k, weight, (*pixels).transmittance, after, is_blended);
+  (*pixels).transmittance = select((*pixels).transmittance, after, is_blended);
+}
+
+fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, least_power: f32) {
+  for (var word = 0u; word < BATCH_WORDS; word++) {
+    if (are_finished(*pixels)) { break; }
+    // Of these 32 splats those that touch the block, two at once: the second is read while the first is blended.
+    var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
+    while (ahead > 0u) {
+      let k = word * 32u + zeros_below(ahead);
+      ahead &= ahead - 1u;
+      let next = select(NO_SPLAT, word * 32u + zeros_below(ahead), ahead != 0u);
+      ahead &= ahead - 1u;
+      blend(pixels, k, place, least_power);
+      blend(pixels, next, place, least_power);
+    }
+  }
+}
+
+fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
+  for (var row = 0u; row < COLUMN; row++) {
+    let pixel = position + vec2u(0u, row);
+    if (any(vec2f(pixel) >= view.viewport)) { break; }
+    note_pixel(pixel, row);
+    store_pixel(pixel, vec3f((*pixels).red[row], (*pixels).green[row], (*pixels).blue[row]), (*pixels).transmittance[row]);
+  }
+}

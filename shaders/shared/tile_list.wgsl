@@ -1,0 +1,95 @@
+// How the workgroup of a tile finds the pairs of its bin that touch the tile. Whoever imports this has 256 threads and loads a splat by `load_splat`.
+#import shared/bins
+#import shared/coverage
+#import shared/prefix
+
+@group(0) @binding(0) var<uniform> view: BinView;
+@group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
+// Slots: bin by bin, in depth order.
+@group(0) @binding(2) var<storage, read> pairs: array<u32>;
+@group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
+// Which pairs touch which tile: see tile_word.
+@group(0) @binding(4) var<storage, read> tile_bits: array<u32>;
+
+const TILE_THREADS = PREFIX_THREADS;
+
+// The window on the bin's pairs: a bit for each that touches the tile, and the number of these up to the end of each word.
+var<workgroup> window: array<u32, TILE_THREADS>;
+var<workgroup> found_upto: array<u32, TILE_THREADS>;
+var<workgroup> found: u32;
+
+// How far a tile has come in the list of its bin. The same for all threads.
+struct ListPlace {
+  // First and end of the bin's pairs.
+  range: vec2u,
+  // First word of the window and the one behind it; pairs found in it, and how many of these are loaded.
+  first_word: u32,
+  next_word: u32,
+  in_window: u32,
+  loaded: u32,
+}
+
+fn begin_list(bin: u32) -> ListPlace {
+  let range = ranges[bin];
+  let first_word = range.x / 32u;
+  return ListPlace(range, first_word, first_word, 0u, 0u);
+}
+
+// Moves the window to the words from `first` on. Ends with a barrier.
+fn move_window(first: u32, range: vec2u, tile_in_bin: u32, lane: u32) {
+  let word = first + lane;
+  var hits = 0u;
+  if (32u * word < range.y) {
+    hits = tile_bits[tile_word(word, tile_in_bin)];
+    // The first and the last word may hold pairs of other bins.
+    if (32u * word < range.x) { hits &= 0xffffffffu << (range.x - 32u * word); }
+    if (32u * word + 32u > range.y) { hits &= 0xffffffffu >> (32u * word + 32u - range.y); }
+  }
+  let upto = inclusive_sum(countOneBits(hits), lane, TILE_THREADS);
+  window[lane] = hits;
+  found_upto[lane] = upto;
+  if (lane == TILE_THREADS - 1u) { found = upto; }
+  workgroupBarrier();
+}
+
+// The nth pair that the window found, counted from its first word.
+fn found_pair(nth: u32) -> u32 {
+  var word = 0u;
+  for (var step = TILE_THREADS / 2u; step > 0u; step /= 2u) {
+    if (found_upto[word + step - 1u] <= nth) { word += step; }
+  }
+  var bits = window[word];
+  var ahead = nth + countOneBits(bits) - found_upto[word];
+  var bit = 0u;
+  for (var width = 16u; width > 0u; width /= 2u) {
+    let below = countOneBits(bits & ((1u << width) - 1u));
+    if (ahead >= below) {
+      ahead -= below;
+      bits >>= width;
+      bit += width;
+    }
+  }
+  return 32u * word + bit;
+}
+
+// Loads the next splats of the tile, `most` or, at the end of the list, fewer, from as many windows as that takes. Needs a barrier behind it. Returns their number.
+fn load_batch(place: ptr<function, ListPlace>, most: u32, tile_in_bin: u32, tile_corner: vec2f, lane: u32) -> u32 {
+  var count = 0u;
+  while (count < most) {
+    if ((*place).loaded == (*place).in_window) {
+      if (32u * (*place).next_word >= (*place).range.y) { break; }
+      (*place).first_word = (*place).next_word;
+      (*place).next_word += TILE_THREADS;
+      move_window((*place).first_word, (*place).range, tile_in_bin, lane);
+      (*place).in_window = workgroupUniformLoad(&found);
+      (*place).loaded = 0u;
+    }
+    let taken = min((*place).in_window - (*place).loaded, most - count);
+    if (lane < taken) {
+      load_splat(count + lane, pairs[32u * (*place).first_word + found_pair((*place).loaded + lane)], tile_corner);
+    }
+    (*place).loaded += taken;
+    count += taken;
+  }
+  return count;
+}
