@@ -7,11 +7,11 @@ import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import * as ort from 'onnxruntime-web';
 import { bytesSource, quaternionOfMatrix, readOnnxHeader, resolveContract, symmetricEigen } from '@gaussian-splat/core';
-import { encodingsFor } from '@gaussian-splat/economise';
+import { codeSequence, encodingsFor } from '@gaussian-splat/economise';
 import { bindInputs } from '@gaussian-splat/generator';
 import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import { walkingPose } from '../../demo/examples/poses.js';
-import { codeSequence } from '../../packages/cli/src/lib/moving-sequence.mjs';
+import { deflate, deflateQuickly, encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { root } from '../lib/run.mjs';
 
@@ -94,6 +94,7 @@ const options = { frameCount, openFrame, framesPerFile, minDecibels: Number(valu
 const begun = performance.now();
 const { first, files, decibels, worstDecibels } = await codeSequence({
   ...options,
+  ...{ encodeWebp, deflate, deflateQuickly },
   onStep: (step) => console.log(`  ${step}`),
 });
 const whole = await openFrame(Math.floor(frameCount / 2));

@@ -143,7 +143,9 @@ test('pages that do not come are asked for again, though the view is at rest', a
   let isDown = true;
   const { scene, live } = await open(folder, {
     fetchPage: (file) =>
-      isDown && file !== 'part-0' ? Promise.reject(new Error(`${file}: offline`)) : folder.fetchPage(file),
+      isDown && file !== 'pages/scene-00000.bin'
+        ? Promise.reject(new Error(`${file}: offline`))
+        : folder.fetchPage(file),
     onError: (error) => errors.push(error),
   });
   const [drawing, picture] = [await renderer(), await target()];

@@ -156,7 +156,7 @@ test('a file that comes short is refused and fetched again, and a view of bytes 
     fetched++;
     return Promise.resolve(answers.shift()!);
   });
-  const whole = files.get('part-0')!;
+  const whole = files.get('pages/scene-00000.bin')!;
   const padded = new Uint8Array(whole.byteLength + 24);
   padded.set(new Uint8Array(whole), 8);
   const nowhere = new Uint8Array(whole.byteLength).fill(255);

@@ -242,7 +242,8 @@ test('a page that does not come is told of, and what stands for it stays on show
   const errors: unknown[] = [];
   const device = await anyDevice();
   const scene = await StreamedGaussians.open(device, folder.manifest, {
-    fetchPage: (file) => (file === 'part-0' ? folder.fetchPage(file) : Promise.reject(new Error(`${file}: 404`))),
+    fetchPage: (file) =>
+      file === 'pages/scene-00000.bin' ? folder.fetchPage(file) : Promise.reject(new Error(`${file}: 404`)),
     onError: (error) => errors.push(error),
   });
   const renderer = new Renderer(device, options);

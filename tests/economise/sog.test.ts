@@ -2,17 +2,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import {
-  allocateSteps,
-  encodingsFor,
-  fitSteps,
-  filesOfZip,
-  writeSog,
-  writeStreamedSog,
-  type SogSteps,
-} from '@gaussian-splat/economise';
+import { encodingsFor, filesOfZip, writeSog, writeStreamedSog, type SogSteps } from '@gaussian-splat/economise';
 import { readLodScene, readScene } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer';
+import { allocateSteps, fitSteps } from '../../packages/economise/src/steps.js';
 import { basisOf, cone, rootOf } from '../support/seen-from.js';
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { randomSource } from '../support/gpu.js';

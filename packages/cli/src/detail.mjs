@@ -1,22 +1,20 @@
 /** The work behind `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
-import { shCoefficientCount } from '@gaussian-splat/core';
+import { toDegree } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
   codingOf,
   cutPages,
-  manifestOf,
-  PageEncoder,
-  packPage,
-  treeOfCopies,
+  findPageSteps,
+  placesOnGrid,
   USUAL_STEPS,
+  writePages,
 } from '@gaussian-splat/economise/pages';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
-import { findSteps } from './lib/coded-pages.mjs';
-import { deflate } from './lib/encoders.mjs';
+import { deflate, deflateQuickly } from './lib/encoders.mjs';
 import { writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/input-file.mjs';
 
@@ -90,30 +88,6 @@ function isUnfinished(folder) {
   return readdirSync(pages).every((name) => /^(scene|top|part)-\d{5,}\.bin$/.test(name));
 }
 
-/** A cloud without the harmonics above a degree. */
-function upTo(degree, cloud) {
-  if (cloud.shDegree <= degree) return cloud;
-  const [all, kept] = [3 * shCoefficientCount(cloud.shDegree), 3 * shCoefficientCount(degree)];
-  const sh = new Float32Array(kept * cloud.count);
-  for (let i = 0; i < cloud.count; i++) sh.set(cloud.sh.subarray(all * i, all * i + kept), kept * i);
-  return { ...cloud, shDegree: degree, sh };
-}
-
-/** Where the copies stand, along a Z-order curve so that neighbours have one parent. */
-function placesOf(columns, rows, spacing) {
-  const interleaved = (x, y) => {
-    let code = 0n;
-    for (let bit = 0n; bit < 12n; bit++) {
-      code |= ((BigInt(x) >> bit) & 1n) << (2n * bit);
-      code |= ((BigInt(y) >> bit) & 1n) << (2n * bit + 1n);
-    }
-    return Number(code);
-  };
-  return Array.from({ length: columns * rows }, (_, i) => [i % columns, Math.floor(i / columns)])
-    .sort((a, b) => interleaved(...a) - interleaved(...b))
-    .map(([x, y]) => [(x - (columns - 1) / 2) * spacing, 0, (y - (rows - 1) / 2) * spacing]);
-}
-
 /** A device, or undefined, with a word on it, where there is none to measure with. */
 async function deviceToMeasure() {
   try {
@@ -129,61 +103,31 @@ async function deviceToMeasure() {
 }
 
 /** How files are coded, and how near to the scene that is; undefined for files that are not. */
-async function chooseCoding({ tree, pages, cloud, minDecibels, scored }) {
+async function chooseCoding({ tree, cloud, minDecibels, scored }) {
   if (minDecibels === undefined) return undefined;
   const device = await deviceToMeasure();
-  if (device === undefined) return { coding: codingOf(USUAL_STEPS) };
-  const { steps, ...found } = await findSteps({
-    ...{ tree, pages, cloud, device, minDecibels, scored },
+  if (device === undefined) return { coding: codingOf(USUAL_STEPS), deflate };
+  const { steps, ...found } = await findPageSteps({
+    ...{ tree, pages: cutPages(tree), cloud, device, minDecibels, scored, deflate: deflateQuickly },
     onStep: (step) => console.log(`  ${step}`),
   });
-  return { coding: codingOf(steps), ...found };
-}
-
-/** Writes the pages of a tree and returns what the manifest says of it. */
-function writeTree(out, name, tree, pages, { coding, seen } = {}) {
-  const encoder = coding && new PageEncoder(tree, coding, { deflate, seen });
-  const fileOf = (p) => `pages/${name}-${String(p).padStart(5, '0')}.bin`;
-  let bytes = 0;
-  pages.forEach((page, p) => {
-    const file = encoder ? encoder.encode(page) : new Uint8Array(packPage(tree, page).buffer);
-    writeFileSync(join(out, fileOf(p)), file);
-    bytes += file.length;
-  });
-  const told = coding && { ...coding, place: undefined };
-  return { manifest: manifestOf(tree, pages, fileOf, told), bytes };
-}
-
-/** The copies and the tree above them: the pages of the copies are those of one tree. */
-function writeCopies(out, tree, places, choice) {
-  const above = treeOfCopies(tree, places);
-  const abovePages = cutPages(above);
-  const top = writeTree(out, 'top', above, abovePages, { coding: choice?.coding });
-  const part = writeTree(out, 'part', tree, cutPages(tree, false), choice);
-  const placeOf = new Map();
-  abovePages.forEach(({ holds }, page) =>
-    holds.forEach(([level, copy], chunk) => level === 0 && placeOf.set(copy, [page, chunk])),
-  );
-  const copies = places.map((translate, copy) => ({ tree: 1, translate, parent: placeOf.get(copy) }));
-  return {
-    manifest: {
-      ...top.manifest,
-      trees: [...top.manifest.trees, ...part.manifest.trees],
-      instances: [...top.manifest.instances, ...copies],
-    },
-    bytes: top.bytes + part.bytes,
-  };
+  return { coding: codingOf(steps), deflate, ...found };
 }
 
 /** Pages first, then the manifest that names them: a folder without one is no scene. Where writing fails no pages stay. */
-function writeFolder(out, writePages) {
+function writeFolder(out, tree, coded, places) {
   const pages = join(out, 'pages');
   if (existsSync(out) && isUnfinished(out)) rmSync(pages, { recursive: true });
   mkdirSync(pages, { recursive: true });
   try {
-    const written = writePages();
-    writeWhole(join(out, 'detail.json'), JSON.stringify(written.manifest));
-    return written;
+    let bytes = 0;
+    const put = (path, file) => {
+      writeFileSync(join(out, path), file);
+      bytes += file.length;
+    };
+    const manifest = writePages(tree, { coded, places, put });
+    writeWhole(join(out, 'detail.json'), JSON.stringify(manifest));
+    return { manifest, bytes };
   } catch (error) {
     rmSync(pages, { recursive: true, force: true });
     throw error;
@@ -192,19 +136,17 @@ function writeFolder(out, writePages) {
 
 async function main({ scene, out, degree, geometry, minDecibels, scored, columns, rows, spacing }) {
   const openPart = (path) => readWhole(join(dirname(scene), path));
-  const cloud = upTo(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
+  const cloud = toDegree(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
   sayWarnings(scene, cloud);
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();
   const isTiled = columns * rows > 1;
   if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
-  const places = isTiled ? placesOf(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : [];
-  const choice = await chooseCoding({ tree, pages: cutPages(tree), cloud, minDecibels, scored });
+  const places = isTiled ? placesOnGrid(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : undefined;
+  const choice = await chooseCoding({ tree, cloud, minDecibels, scored });
   const coded = performance.now();
-  const { manifest, bytes } = writeFolder(out, () =>
-    isTiled ? writeCopies(out, tree, places, choice) : writeTree(out, 'scene', tree, cutPages(tree), choice),
-  );
+  const { manifest, bytes } = writeFolder(out, tree, choice, places);
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
   const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);
   const perSplat = isTiled ? '' : `, ${(bytes / manifest.splats).toFixed(2)} bytes a splat`;

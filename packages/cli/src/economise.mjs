@@ -6,8 +6,10 @@ import {
   dealtViewsAround,
   dealViews,
   economise,
+  economiseWithin,
   encodingsFor,
   filesOfZip,
+  FIRST_DECIBELS,
   GpuEvaluator,
   isLodIndex,
   MergingEvaluator,
@@ -156,37 +158,6 @@ async function openDevice() {
   return device;
 }
 
-/** Where a search by bytes begins, its steps, and how near to them it ends. */
-const FIRST_DECIBELS = 45;
-const DECIBELS_STEP = 6;
-const SEARCHES = 7;
-const FULL_ENOUGH = 0.97;
-const LEAST_DECIBELS = 15;
-
-/** The most accurate file that has so few bytes. @returns what was asked for it in dB, and it */
-async function withinBytes(reach, maxBytes, say) {
-  let [low, high, best] = [-Infinity, Infinity, undefined];
-  let decibels = FIRST_DECIBELS;
-  for (let tries = 0; tries < SEARCHES; tries++) {
-    const found = await reach(decibels).catch((error) => {
-      // More than the format has is too much as well.
-      if (error.code === 'argument/value') return undefined;
-      throw error;
-    });
-    say(`${decibels.toFixed(1)} dB: ${found ? `${found.bytes.length} bytes` : 'beyond the format'}`);
-    if (found && found.bytes.length <= maxBytes) [low, best] = [decibels, [decibels, found]];
-    else high = decibels;
-    if (best && best[1].bytes.length >= FULL_ENOUGH * maxBytes) break;
-    if (low === -Infinity) decibels = high - DECIBELS_STEP;
-    else decibels = high === Infinity ? low + DECIBELS_STEP : (low + high) / 2;
-    if (decibels < LEAST_DECIBELS) break;
-  }
-  if (best) return best;
-  throw new UsageError(
-    `--max-mb: ${(maxBytes / 1e6).toFixed(2)} MB have no room for the scene at ${LEAST_DECIBELS} dB`,
-  );
-}
-
 async function main({
   scene,
   out,
@@ -225,10 +196,11 @@ async function main({
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;
-  const reach = (minDecibels) =>
-    economise(cloud, { ...{ minDecibels, name: out, evaluator, pool, encodeWebp }, onStep: say });
-  const [minDecibels, result] =
-    maxBytes === undefined ? [asked, await reach(asked)] : await withinBytes(reach, maxBytes, say);
+  const options = { name: out, evaluator, pool, encodeWebp, onStep: say };
+  const { minDecibels, ...result } =
+    maxBytes === undefined
+      ? { ...(await economise(cloud, { ...options, minDecibels: asked })), minDecibels: asked }
+      : await economiseWithin(cloud, maxBytes, options);
   writeOut(out, result.bytes);
   const { splats, coefficients } = result;
   const spent = { read, prepare, ...result.seconds, total: seconds() };

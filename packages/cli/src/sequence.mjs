@@ -4,7 +4,8 @@ import { basename, dirname, join, resolve } from 'node:path';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
-import { codeSequence } from './lib/moving-sequence.mjs';
+import { codeSequence } from '@gaussian-splat/economise';
+import { deflate, deflateQuickly, encodeWebp } from './lib/encoders.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/input-file.mjs';
@@ -52,6 +53,7 @@ async function main({ manifest, out, minDecibels, framesPerFile }) {
   };
   const { first, files, decibels, worstDecibels } = await codeSequence({
     ...{ frameCount, openFrame, framesPerFile, minDecibels, device: await openDevice() },
+    ...{ encodeWebp, deflate, deflateQuickly },
     onStep: (step) => console.log(`  ${step}`),
   });
   mkdirSync(out, { recursive: true });

@@ -1,10 +1,11 @@
+export { economiseWithin, FIRST_DECIBELS, type EconomisedWithin } from './within-bytes.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
 export type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
 export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, type Image } from './measure.js';
 export type { TaskPool } from './parts/task-pool.js';
-export { degreesOf, reduce, splatsOf, type Cut, type ReducedCloud } from './reduce.js';
+export { degreesOf, reduce, splatsOf, toDegree, type Cut, type ReducedCloud } from './reduce.js';
 export { RefiningEvaluator, type RefiningOptions } from './refine/refining-evaluator.js';
 export type { Descent, Rates } from './refine/scene-fitter.js';
 export type { LoweredColours, Ranking, Scores } from './score.js';
@@ -19,16 +20,10 @@ export {
   type ViewOptions,
 } from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';
-export {
-  allocateSteps,
-  fitSteps,
-  scaledSteps,
-  type AllocateOptions,
-  type FitStepsOptions,
-  type Steps,
-} from './allocate-steps.js';
+export { findSteps, scaledSteps, type FindStepsOptions, type Steps } from './steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
 export { filesOfZip } from './write/zip.js';
-export { writeMotion, type MotionOptions, type MotionSteps } from './write/motion.js';
-export { withNearAxes } from './write/near-axes.js';
+export { codeSequence, type CodedSequence, type CodeSequenceOptions } from './motion/code-sequence.js';
+export { withNearAxes } from './motion/near-axes.js';
+export { writeMotion, type MotionOptions, type MotionSteps } from './motion/write-motion.js';

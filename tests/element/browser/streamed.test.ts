@@ -84,7 +84,7 @@ describe('a streamed scene', () => {
     const element = show({ src: '/net/kept/streamed/detail.json', 'camera-orbit': '30deg 60deg 30m' });
     await element.ready;
     assert(element.loaded && element.error === null, `loaded: ${element.error?.message}`);
-    assertEqual(requests[0], 'part-0');
+    assertEqual(requests[0], 'pages/scene-00000.bin');
     const few = requests.length;
     element.setAttribute('camera-orbit', '200deg 80deg 1m');
     await until(() => requests.length > few + 3, 'pages for another view');
@@ -152,7 +152,7 @@ describe('a streamed scene', () => {
     const warned: string[] = [];
     const original = console.warn;
     console.warn = (message: unknown) => void warned.push(String(message));
-    const some = await serve('/net/kept/gaps/', /part-[1-9]/);
+    const some = await serve('/net/kept/gaps/', /scene-0000[1-9]/);
     const element = show({ src: '/net/kept/gaps/detail.json', 'camera-orbit': '30deg 60deg 2m' });
     await element.ready;
     await until(() => warned.some((message) => message.includes('404')), 'a word on the missing page');
@@ -160,7 +160,7 @@ describe('a streamed scene', () => {
     await close(element);
     some.stop();
     console.warn = original;
-    const none = await serve('/net/kept/none/', /part-0/);
+    const none = await serve('/net/kept/none/', /scene-00000/);
     const broken = show({ src: '/net/kept/none/detail.json' });
     await broken.ready;
     assertEqual(broken.error?.reason, 'network/status');
@@ -174,14 +174,17 @@ describe('a streamed scene', () => {
     await element.ready;
     assertEqual(element.stats?.detail.pixels, 0.3, 'pixels');
     for (let loss = 0; loss < 2; loss++) {
-      await until(() => requests.filter((name) => name !== 'part-0').length > 0, 'pages on their way');
+      await until(() => requests.filter((name) => name !== 'pages/scene-00000.bin').length > 0, 'pages on their way');
       const restored = nextEvent(element, 'contextrestored');
       requests.length = 0;
       devices[devices.length - 1].destroy();
       await restored;
       await until(() => element.stats?.detail.pixels === 0.3, 'as much detail as before');
     }
-    await until(() => requests.filter((name) => name !== 'part-0').length > 0, 'pages of the new device');
+    await until(
+      () => requests.filter((name) => name !== 'pages/scene-00000.bin').length > 0,
+      'pages of the new device',
+    );
     assertEqual(new Set(requests).size, requests.length, 'no page twice');
     await close(element);
     assertEqual(MemoryLedger.of(devices[devices.length - 1]).bytes, 0, 'bytes held');

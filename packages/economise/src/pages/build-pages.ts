@@ -189,6 +189,7 @@ export function manifestOf(
   fileOf: (page: number) => string,
   coding?: PageCoding,
 ): DetailManifest {
+  const stated = coding && statedOf(coding);
   const { splats, shPrecision, geometry, antialiased, filterVariance, origin, bounds, levels } = tree;
   return {
     ...{
@@ -197,7 +198,7 @@ export function manifestOf(
       splats,
       shDegree: levels[0].shDegree,
     },
-    ...{ shPrecision: coding ? 'int8' : shPrecision, ...(geometry && { geometry }), ...(coding && { coding }) },
+    ...{ shPrecision: coding ? 'int8' : shPrecision, ...(geometry && { geometry }), ...(stated && { coding: stated }) },
     ...{ antialiased, filterVariance, origin, bounds },
     trees: [
       {
@@ -212,3 +213,8 @@ export function manifestOf(
     instances: [{ tree: 0, translate: [0, 0, 0] }],
   };
 }
+
+/** A coding without what only its writer needs. */
+const statedOf = ({ size, directions, opacity, color, chroma, scale }: PageCoding): PageCoding => ({
+  ...{ size, directions, opacity, color, chroma, scale },
+});

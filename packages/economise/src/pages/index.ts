@@ -16,6 +16,8 @@ export {
   type PageSteps,
   type WrittenCoding,
 } from './encode-page.js';
+export { findPageSteps, type FoundPageSteps, type PageStepsOptions } from './find-page-steps.js';
+export { placesOnGrid, writePages, type FolderCoding, type PageFolderOptions } from './page-folder.js';
 export { cloudOfChunks, type PageChunks } from './page-cloud.js';
 export type { Deflate } from './page-planes.js';
 export { HarmonicRounder } from './round-harmonics.js';

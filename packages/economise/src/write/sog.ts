@@ -1,7 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { packedOrder } from '@gaussian-splat/renderer';
 import type { SeenSplats } from '../pages/seen-splats.js';
-import type { Steps } from '../allocate-steps.js';
+import type { Steps } from '../steps.js';
 import { findPalette, type Palette } from './palette.js';
 import { addedBy, DIGITS, roundPalette, weightsOf } from './sog-palette.js';
 import { writeZip } from './zip.js';

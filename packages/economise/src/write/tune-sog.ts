@@ -1,6 +1,6 @@
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
 import type { SeenSplats } from '../pages/seen-splats.js';
-import { allocateSteps, fitSteps, scaledSteps } from '../allocate-steps.js';
+import { findSteps, scaledSteps } from '../steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
 import type { Palette } from './palette.js';
 import { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './sog.js';
@@ -77,15 +77,11 @@ async function tuned(
   }
   const least = (1 - PALETTE_SHARE) * target * 0.25;
   const share = cloud.shDegree > 0 ? Math.max(least, rest) : target;
-  const measured = (steps: SogSteps): Promise<number> => errorOf(steps, palette);
   const ofPalette = 1.5 * (shCoefficientCount(cloud.shDegree) - 1) * Math.min(1, palette / cloud.count);
   const numbers = ofPalette > 0 ? { ...NUMBERS, harmonics: ofPalette } : NUMBERS;
-  const usual = await allocateSteps({ usual: USUAL, numbers, measure: measured, target: share });
-  const { steps } = await fitSteps({
-    steps: usual,
-    measure: async (scaled) => ({ error: await measured(scaled) }),
-    target,
-    nearEnough: NEAR_ENOUGH,
+  const { steps } = await findSteps({
+    ...{ usual: USUAL, numbers, share, target, nearEnough: NEAR_ENOUGH },
+    measure: (tried) => errorOf(tried, palette),
   });
   return { steps, palette, encodeWebp, seen };
 }

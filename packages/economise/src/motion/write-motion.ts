@@ -1,6 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { MOTION_MODES, MOTION_VERSION, MOVING, MOVING_NAMES, type MovingName } from '@gaussian-splat/formats';
-import type { Steps } from '../allocate-steps.js';
+import type { Deflate } from '../pages/page-planes.js';
+import type { Steps } from '../steps.js';
 import { mainCurves } from './main-curves.js';
 
 /** What is rounded: `position` in world units, `rotation` in radians, `scale` in natural logarithms, `opacity` and `color` (the constant coefficient) in their own. */
@@ -8,8 +9,7 @@ export type MotionSteps = Steps<MovingName>;
 
 export interface MotionOptions {
   readonly steps: MotionSteps;
-  /** What compresses bytes to a piece of a raw deflate stream that others are put behind. */
-  readonly deflate: (bytes: Uint8Array) => Uint8Array;
+  readonly deflate: Deflate;
 }
 
 /** Codes below this share of a step are 0: zeros cost hardly a bit. */

@@ -1,4 +1,4 @@
-/** What is rounded, each by its own step, and how many numbers of a splat have that step. */
+/** Step sizes of what is rounded. */
 export type Steps<K extends string> = Readonly<Record<K, number>>;
 
 export interface AllocateOptions<K extends string> {
@@ -36,6 +36,30 @@ export async function allocateSteps<K extends string>(options: AllocateOptions<K
   return steps;
 }
 
+export interface FindStepsOptions<
+  K extends string,
+  Found extends { readonly error: number },
+> extends AllocateOptions<K> {
+  /** Part of the target that steps are allocated for, if something else makes errors, too; default: all of it. */
+  readonly share?: number;
+  /** Finds the error of steps, and more, as the result is judged; default: {@link AllocateOptions.measure}. */
+  readonly judge?: (steps: Steps<K>) => Promise<Found>;
+  /** Part of the target at which the search ends; default 0.97. */
+  readonly nearEnough?: number;
+}
+
+/**
+ * Finds the coarsest steps within an error: {@link allocateSteps} balances them, {@link fitSteps} scales all of them.
+ * @returns the steps, and what `judge` found with them
+ */
+export async function findSteps<K extends string, Found extends { readonly error: number }>(
+  options: FindStepsOptions<K, Found>,
+): Promise<Found & { readonly steps: Steps<K> }> {
+  const { measure, target, share = target, nearEnough } = options;
+  const judge = options.judge ?? (async (steps) => ({ error: await measure(steps) }) as Found);
+  return fitSteps({ steps: await allocateSteps({ ...options, target: share }), measure: judge, target, nearEnough });
+}
+
 /** The same steps, times a factor. */
 export const scaledSteps = <K extends string>(steps: Steps<K>, factor: number): Steps<K> =>
   Object.fromEntries(Object.entries<number>(steps).map(([name, step]) => [name, step * factor])) as Steps<K>;
@@ -55,7 +79,7 @@ export interface FitStepsOptions<K extends string, Found extends { readonly erro
   /** Measurements at most; default 6. */
   readonly tries?: number;
   /** Part of the target that is near enough to end with; default 0.97. */
-  readonly nearEnough?: number;
+  readonly nearEnough?: number | undefined;
 }
 
 /**
