@@ -3,7 +3,7 @@ import { writeFileSync } from 'node:fs';
 import { format } from 'prettier';
 import { root } from './lib/run.mjs';
 
-const { CONTRACT_SCHEMA } = await import('../packages/core/dist/index.js');
+const { CONTRACT_SCHEMA } = await import('../packages/core/dist/contract/index.js');
 const path = `${root}packages/core/contract.schema.json`;
 writeFileSync(path, await format(JSON.stringify(CONTRACT_SCHEMA), { parser: 'json', printWidth: 120 }));
 console.log(`wrote ${path}`);

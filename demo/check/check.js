@@ -1,15 +1,14 @@
 /** The conformance checker as a page: the same reader, the same checks, the same runs and the same tables as the command; and the GPU's numbers beside the CPU's. */
+import { GaussianSplatError } from '@gaussian-splat/core';
 import {
-  blobSource,
   checkContract,
   checkFile,
   ContractError,
   contractReport,
   describeFault,
-  GaussianSplatError,
-  readOnnxHeader,
   resolveContract,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
+import { blobSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
 
 const byId = (id) => document.getElementById(id);
 

@@ -1,5 +1,6 @@
 /** The page of trained examples: what each costs, read from its own files, and handles for time, pose and shape. */
-import { openUrl, readOnnxHeader, resolveContract } from '@gaussian-splat/core';
+import { resolveContract } from '@gaussian-splat/core/contract';
+import { openUrl, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { fillCostCard } from '../site/cost-card.js';
 import { poseOf, walkingPose } from './poses.js';
 

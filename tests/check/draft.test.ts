@@ -1,7 +1,7 @@
 /** Drafts of contracts: what a file's names and shapes allow is a contract that the file keeps. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { checkContract, parseContract } from '@gaussian-splat/core';
+import { checkContract, parseContract } from '@gaussian-splat/core/contract';
 import { draftContract } from '@gaussian-splat/check';
 import { headerWith, tensor } from '../contract/support.js';
 import { fixtureHeader } from '../support/generators.js';

@@ -1,13 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import {
-  checkContract,
-  resolveContract,
-  type Contract,
-  type OnnxHeader,
-  type OnnxTensor,
-  type PackedOutputs,
-} from '@gaussian-splat/core';
+import { checkContract, resolveContract, type Contract, type PackedOutputs } from '@gaussian-splat/core/contract';
+import type { OnnxHeader, OnnxTensor } from '@gaussian-splat/core/onnx';
 import { fixtureHeader, fixtureNames, fixtureSidecar } from '../support/generators.js';
 import { assertHelpful, brief, headerWith, PACKED, SPLIT, SPLIT_OUTPUTS, tensor } from './support.js';
 

@@ -1,15 +1,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { halfToNumber, numberToHalf } from '@gaussian-splat/core';
 import {
   checkBounds,
   checkOutputs,
   compareRuns,
-  halfToNumber,
-  numberToHalf,
   type Contract,
   type ContractFault,
   type OutputTensor,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
 import { seededRandom } from '../support/random.js';
 import { assertHelpful, PACKED, SPLIT } from './support.js';
 

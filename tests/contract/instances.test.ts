@@ -9,8 +9,8 @@ import {
   outputsOfInstance,
   parseContract,
   type Contract,
-  type OnnxTensor,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
+import type { OnnxTensor } from '@gaussian-splat/core/onnx';
 import { bindInputs, groupInstances, inputsOfInstances, stackInputs, type Inputs } from '@gaussian-splat/generator';
 import { assertHelpful, brief, faultsOf, headerWith, PACKED, SPLIT, tensor } from './support.js';
 

@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { ContractError, GaussianSplatError, parseContract } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { ContractError, parseContract } from '@gaussian-splat/core/contract';
 import { brief, faultsOf, PACKED, SPLIT } from './support.js';
 
 const withOutputs = (outputs: object): unknown => ({ ...PACKED, outputs: { ...PACKED.outputs, ...outputs } });

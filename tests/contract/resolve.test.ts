@@ -10,7 +10,7 @@ import {
   sidecarName,
   type AttributeSlice,
   type Contract,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
 import { fixtureHeader, fixtureSidecar } from '../support/generators.js';
 import { brief, faultsOf, headerWith, PACKED, SPLIT, SPLIT_OUTPUTS, tensor } from './support.js';
 

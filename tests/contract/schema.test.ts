@@ -4,7 +4,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { Ajv2020 } from 'ajv/dist/2020.js';
-import { CONTRACT_SCHEMA, ContractError, parseContract, type Contract } from '@gaussian-splat/core';
+import { CONTRACT_SCHEMA, ContractError, parseContract, type Contract } from '@gaussian-splat/core/contract';
 import { seededRandom } from '../support/random.js';
 import { fixturePath } from '../support/generators.js';
 import { assertHelpful, PACKED, SPLIT } from './support.js';

@@ -1,12 +1,7 @@
 /** Contracts and headers that several tests of the contract start from. */
 import assert from 'node:assert/strict';
-import {
-  ContractError,
-  type Contract,
-  type ContractFault,
-  type OnnxHeader,
-  type OnnxTensor,
-} from '@gaussian-splat/core';
+import { ContractError, type Contract, type ContractFault } from '@gaussian-splat/core/contract';
+import type { OnnxHeader, OnnxTensor } from '@gaussian-splat/core/onnx';
 
 export const PACKED: Contract = {
   version: 1,

@@ -2,15 +2,15 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
+import { numberToHalf } from '@gaussian-splat/core';
 import {
   checkContract,
   checkOutputs,
-  numberToHalf,
   type Contract,
-  type OnnxDtype,
   type OutputBinding,
   type OutputTensor,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
+import type { OnnxDtype } from '@gaussian-splat/core/onnx';
 import { headerWith, tensor } from './support.js';
 
 interface Tensor {

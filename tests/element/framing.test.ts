@@ -2,16 +2,9 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
-import {
-  boundsOf,
-  bytesSource,
-  readOnnxHeader,
-  resolveContract,
-  type Bounds,
-  type Camera,
-  type GaussianCloud,
-  type Vector3,
-} from '@gaussian-splat/core';
+import { boundsOf, type Bounds, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { resolveContract } from '@gaussian-splat/core/contract';
+import { bytesSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { readScene } from '@gaussian-splat/formats';
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
 import { declaredBounds } from '../../packages/element/src/live/open-live-model.js';

@@ -1,7 +1,8 @@
 /** What a page says, in a generator's words: values within ranges, and reports of what does not fit. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import type { Camera, Contract, GaussianSplatError } from '@gaussian-splat/core';
+import type { Camera, GaussianSplatError } from '@gaussian-splat/core';
+import type { Contract } from '@gaussian-splat/core/contract';
 import type { GeneratorModel, GeneratorState } from '@gaussian-splat/generator';
 import type { LiveState } from '../../packages/element/src/live/live-model.js';
 import { StateReader } from '../../packages/element/src/live/read-state.js';

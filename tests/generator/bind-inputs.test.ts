@@ -1,17 +1,9 @@
 /** Roles to values: each checked against what it means, by projecting points, not against the code's own matrices. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import {
-  eyeOf,
-  GaussianSplatError,
-  lookAt,
-  type Camera,
-  type CameraAxes,
-  type Contract,
-  type InputBinding,
-  type OnnxTensor,
-  type Vector3,
-} from '@gaussian-splat/core';
+import { eyeOf, GaussianSplatError, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
+import type { CameraAxes, Contract, InputBinding } from '@gaussian-splat/core/contract';
+import type { OnnxTensor } from '@gaussian-splat/core/onnx';
 import { bindInputs, sameInputs, type GeneratorState, type InputNumbers } from '@gaussian-splat/generator';
 import { headerWith, PACKED, tensor } from '../contract/support.js';
 import { seededRandom } from '../support/random.js';

@@ -1,7 +1,7 @@
 /** What counts as another result, and what as rounding: the pure half of the comparison of a page's GPU with its CPU. */
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import type { AttributeSlice } from '@gaussian-splat/core';
+import type { AttributeSlice } from '@gaussian-splat/core/contract';
 import { compareParts, isDifferent, type ComparedPart } from '@gaussian-splat/generator';
 
 const ROWS = 2000;

@@ -9,14 +9,9 @@ import { fileURLToPath } from 'node:url';
 import * as ort from 'onnxruntime-web';
 import { PNG } from 'pngjs';
 import { checkModel } from '@gaussian-splat/check';
-import {
-  bytesSource,
-  cameraFromCalibration,
-  gaussianLayout,
-  oneInstance,
-  readOnnxHeader,
-  resolveContract,
-} from '@gaussian-splat/core';
+import { cameraFromCalibration } from '@gaussian-splat/core';
+import { gaussianLayout, oneInstance, resolveContract } from '@gaussian-splat/core/contract';
+import { bytesSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import {
   bindInputs,
   groupInstances,

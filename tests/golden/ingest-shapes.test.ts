@@ -1,7 +1,8 @@
 /** The same Gaussians in every shape that a model may write them in: each is drawn to the same pixels. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { gaussianLayout, type Contract, type OnnxTensor, type SplitOutputs } from '@gaussian-splat/core';
+import { gaussianLayout, type Contract, type SplitOutputs } from '@gaussian-splat/core/contract';
+import type { OnnxTensor } from '@gaussian-splat/core/onnx';
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
 import { headerWith, tensor } from '../contract/support.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';

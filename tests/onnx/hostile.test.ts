@@ -1,7 +1,8 @@
 /** Damaged and hostile files: every one ends quickly, in a header or in an error that names the file. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { bytesSource, GaussianSplatError, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { bytesSource, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core/onnx';
 import { isLab } from '../support/extent.js';
 import { fixtureBytes, fixtureNames } from '../support/generators.js';
 import { seededRandom } from '../support/random.js';

@@ -1,15 +1,15 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
+import { GaussianSplatError } from '@gaussian-splat/core';
 import {
   blobSource,
   bytesSource,
-  GaussianSplatError,
   gpuNotes,
   readOnnxHeader,
   uncastableTypes,
   type OnnxHeader,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/onnx';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { fixtureBytes, fixtureHeader, fixtureNames, fixturePath } from '../support/generators.js';
 

@@ -3,7 +3,8 @@ import assert from 'node:assert/strict';
 import { createServer, type IncomingMessage, type Server, type ServerResponse } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
-import { bytesSource, GaussianSplatError, openUrl, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { bytesSource, openUrl, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core/onnx';
 import { fixtureBytes } from '../support/generators.js';
 
 const SMALL = fixtureBytes('packed.onnx');

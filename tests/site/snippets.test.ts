@@ -20,6 +20,8 @@ const isFull = process.env.SITE === 'full';
 const AT_HAND = `
 import type * as React from 'react';
 import type * as core from '@gaussian-splat/core';
+import type { Contract, gaussianLayout as layoutOf } from '@gaussian-splat/core/contract';
+import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import type * as economise from '@gaussian-splat/economise';
 import type * as models from '@gaussian-splat/generator';
 import type * as drawing from '@gaussian-splat/renderer';
@@ -39,10 +41,10 @@ declare global {
   const camera: core.Camera;
   const cloud: core.GaussianCloud;
   const bounds: ReturnType<typeof core.boundsOf>;
-  const header: core.OnnxHeader;
-  const contract: core.Contract;
+  const header: OnnxHeader;
+  const contract: Contract;
   const boundsOf: typeof core.boundsOf;
-  const gaussianLayout: typeof core.gaussianLayout;
+  const gaussianLayout: typeof layoutOf;
   const views: economise.DealtViews;
   const gaussians: drawing.GaussianBuffers;
   const roomGaussians: drawing.GaussianBuffers;

@@ -1,13 +1,6 @@
 /** Clouds written as generators write them, in any layout of the contract, and read again as plain float64 code would. */
-import {
-  halfToNumber,
-  numberToHalf,
-  shCoefficientCount,
-  type AttributeSlice,
-  type GaussianAttribute,
-  type GaussianCloud,
-  type GaussianLayout,
-} from '@gaussian-splat/core';
+import { halfToNumber, numberToHalf, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import type { AttributeSlice, GaussianAttribute, GaussianLayout } from '@gaussian-splat/core/contract';
 import { eigenvectors, quaternionOf } from './symmetric.js';
 
 const SH_C0 = 0.28209479177387814;

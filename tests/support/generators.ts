@@ -1,7 +1,7 @@
 /** The small ONNX files of tests/fixtures/generators, and the real ones of the shared data. */
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
-import { bytesSource, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core';
+import { bytesSource, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core/onnx';
 
 const folder = fileURLToPath(new URL('../fixtures/generators/', import.meta.url));
 

@@ -1,18 +1,17 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
 import {
   carriesContract,
   checkContract,
   checkFile,
   ContractError,
   contractReport,
-  GaussianSplatError,
-  readOnnxHeader,
   resolveContract,
   type Contract,
   type ContractFault,
-  type OnnxHeader,
   type ReportSection,
   type ResolvedContract,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
+import { readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core/onnx';
 import { openModel, readText, type ModelLocation } from './model-location.js';
 import { runModel, type RunReport, type Runtime } from './run-samples.js';
 

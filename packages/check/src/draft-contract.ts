@@ -1,4 +1,5 @@
-import type { Contract, InputBinding, OnnxHeader, OnnxTensor, OutputBinding } from '@gaussian-splat/core';
+import type { Contract, InputBinding, OutputBinding } from '@gaussian-splat/core/contract';
+import type { OnnxHeader, OnnxTensor } from '@gaussian-splat/core/onnx';
 
 /** A contract that the names and shapes of a file allow, and what its author must still decide. */
 export interface Draft {

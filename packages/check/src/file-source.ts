@@ -1,6 +1,7 @@
 import { open, stat, type FileHandle } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
-import { isInside, type ByteSource, type ExternalFile } from '@gaussian-splat/core';
+import { isInside } from '@gaussian-splat/core/contract';
+import type { ByteSource, ExternalFile } from '@gaussian-splat/core/onnx';
 
 /** A file on disk, read in pieces. */
 export class FileSource implements ByteSource {

@@ -1,6 +1,7 @@
 import { parseArgs } from 'node:util';
 import { writeFile } from 'node:fs/promises';
-import { describeFault, readOnnxHeader, sidecarName, type ReportSection } from '@gaussian-splat/core';
+import { describeFault, sidecarName, type ReportSection } from '@gaussian-splat/core/contract';
+import { readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { draftContract } from './draft-contract.js';
 import { openModel } from './model-location.js';
 import { checkModel, type CheckFault, type CheckReport } from './check-model.js';

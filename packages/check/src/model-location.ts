@@ -1,14 +1,8 @@
 import { readFile } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
-import {
-  GaussianSplatError,
-  openUrl,
-  partUrl,
-  sidecarName,
-  type ByteSource,
-  type ExternalFile,
-  type UrlSource,
-} from '@gaussian-splat/core';
+import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
+import { sidecarName } from '@gaussian-splat/core/contract';
+import { openUrl, type ByteSource, type ExternalFile, type UrlSource } from '@gaussian-splat/core/onnx';
 import { externalSizes, FileSource } from './file-source.js';
 
 /** A model on disk or on a server, with what lies beside it. */

@@ -1,5 +1,5 @@
 /** What the checker's page takes of this package: no Node in it. */
-import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import {
   compareParts,
   GeneratorSession,

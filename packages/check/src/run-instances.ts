@@ -1,11 +1,6 @@
-import {
-  halfToNumber,
-  outputsOfInstance,
-  type Contract,
-  type ContractFault,
-  type OnnxHeader,
-  type OutputTensor,
-} from '@gaussian-splat/core';
+import { halfToNumber } from '@gaussian-splat/core';
+import { outputsOfInstance, type Contract, type ContractFault, type OutputTensor } from '@gaussian-splat/core/contract';
+import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { groupInstances, inputsOfInstances, stackInputs, type Inputs } from '@gaussian-splat/generator';
 import type { Sample } from './sample-inputs.js';
 

@@ -4,8 +4,8 @@ import {
   compareRuns,
   type Contract,
   type ContractFault,
-  type OnnxHeader,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
+import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import type * as OnnxRuntime from 'onnxruntime-web';
 import type { InferenceSession, Tensor } from 'onnxruntime-web';
 import { compareTogether, runAlone, stacked, type Outputs, type SampleInputs } from './run-instances.js';

@@ -1,14 +1,6 @@
-import {
-  lookAt,
-  numberToHalf,
-  oneInstance,
-  type Camera,
-  type Contract,
-  type GaussiansInput,
-  type OnnxHeader,
-  type OnnxTensor,
-  type Vector3,
-} from '@gaussian-splat/core';
+import { lookAt, numberToHalf, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { oneInstance, type Contract, type GaussiansInput } from '@gaussian-splat/core/contract';
+import type { OnnxHeader, OnnxTensor } from '@gaussian-splat/core/onnx';
 import { bindInputs, type GeneratorState } from '@gaussian-splat/generator';
 
 /** One input of a run: float16 as bits. */

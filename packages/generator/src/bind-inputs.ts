@@ -1,13 +1,6 @@
-import {
-  describeTensor,
-  eyeOf,
-  GaussianSplatError,
-  type Camera,
-  type Contract,
-  type InputBinding,
-  type OnnxHeader,
-  type OnnxTensor,
-} from '@gaussian-splat/core';
+import { eyeOf, GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import type { Contract, InputBinding } from '@gaussian-splat/core/contract';
+import { describeTensor, type OnnxHeader, type OnnxTensor } from '@gaussian-splat/core/onnx';
 import {
   cameraToWorld,
   inOrder,

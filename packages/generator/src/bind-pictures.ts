@@ -1,10 +1,6 @@
-import {
-  describeTensor,
-  GaussianSplatError,
-  type Contract,
-  type OnnxHeader,
-  type OnnxTensor,
-} from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { Contract } from '@gaussian-splat/core/contract';
+import { describeTensor, type OnnxHeader, type OnnxTensor } from '@gaussian-splat/core/onnx';
 import { elementsOf, type GpuTensor } from './input-value.js';
 import type { GeneratorState } from './state.js';
 

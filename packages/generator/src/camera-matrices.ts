@@ -1,4 +1,5 @@
-import type { Camera, CameraAxes, MatrixOrder } from '@gaussian-splat/core';
+import type { Camera } from '@gaussian-splat/core';
+import type { CameraAxes, MatrixOrder } from '@gaussian-splat/core/contract';
 import { inverse, multiply } from '@gaussian-splat/core';
 
 /** Signs that turn OpenCV's camera axes (right, down, forward) into others. */

@@ -1,4 +1,5 @@
-import { ContractError, GaussianSplatError, type Contract, type GaussianLayout } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { ContractError, type Contract, type GaussianLayout } from '@gaussian-splat/core/contract';
 import { Generator, type GaussianSink, type GeneratedFrame, type GeneratorOptions } from './generator.js';
 import type { ModelSource } from './runtime/open-model.js';
 import type { GeneratorState } from './state.js';

@@ -1,4 +1,4 @@
-import { ContractError, type GaussianLayout } from '@gaussian-splat/core';
+import { ContractError, type GaussianLayout } from '@gaussian-splat/core/contract';
 import { batchOf, type Seat } from './batch/batch.js';
 import { Chain } from './chain/chain.js';
 import { sameInputs, type Inputs } from './input-value.js';

@@ -1,4 +1,4 @@
-import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import { Chain } from './chain/chain.js';
 import { imageShapeOf } from './bind-pictures.js';
 import { sameInputs, type GpuTensor, type Inputs } from './input-value.js';

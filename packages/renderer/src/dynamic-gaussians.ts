@@ -1,11 +1,5 @@
-import {
-  boundsOf,
-  GaussianSplatError,
-  type Bounds,
-  type GaussianLayout,
-  type ShDegree,
-  type Vector3,
-} from '@gaussian-splat/core';
+import { boundsOf, GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import type { GaussianLayout } from '@gaussian-splat/core/contract';
 import { pageCapacity } from './gaussian-buffers.js';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';

@@ -1,9 +1,5 @@
-import {
-  GaussianSplatError,
-  type AttributeSlice,
-  type GaussianAttribute,
-  type GaussianLayout,
-} from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { AttributeSlice, GaussianAttribute, GaussianLayout } from '@gaussian-splat/core/contract';
 import { constants, type layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, type Resource } from './gpu/kernel.js';
 import type { GpuMemory } from './gpu/memory.js';

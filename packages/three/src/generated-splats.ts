@@ -1,4 +1,4 @@
-import type { GaussianLayout } from '@gaussian-splat/core';
+import type { GaussianLayout } from '@gaussian-splat/core/contract';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { SplatScene, type SplatSceneOptions } from './splat-scene.js';
 

@@ -1,5 +1,5 @@
 /** What is known of ONNX Runtime's WebGPU provider, held against the version that ships: recorded commands, and convolutions. */
-import { bytesSource, constantOutputs, readOnnxHeader } from '@gaussian-splat/core';
+import { bytesSource, constantOutputs, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { ImageTensor } from '@gaussian-splat/renderer';
 import { bindInputs, openModel, PostProcessor, type GeneratorState } from '@gaussian-splat/generator';
 import type * as FirstRun from '../../../packages/generator/dist/runtime/first-run.js';

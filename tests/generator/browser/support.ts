@@ -1,12 +1,7 @@
 /** What the tests of running generators share: a device, sinks that read back, the truth from the CPU, and counters. */
-import {
-  bytesSource,
-  carriesContract,
-  halfToNumber,
-  readOnnxHeader,
-  resolveContract,
-  type Camera,
-} from '@gaussian-splat/core';
+import { halfToNumber, type Camera } from '@gaussian-splat/core';
+import { carriesContract, resolveContract } from '@gaussian-splat/core/contract';
+import { bytesSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { autotune } from '@gaussian-splat/renderer';
 import { bindInputs, setRuntimeLocation, type GaussianSink, type GeneratorState } from '@gaussian-splat/generator';
 import type * as OnnxRuntime from 'onnxruntime-web/wasm';

@@ -1,6 +1,7 @@
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { constants, scaleRotationFactor, shWords } from '@gaussian-splat/renderer/stages';
-import { halfToNumber, shCoefficientCount, type GaussianCloud, type GaussianLayout } from '@gaussian-splat/core';
+import { halfToNumber, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import type { GaussianLayout } from '@gaussian-splat/core/contract';
 import { check, checkEqual, type Bench, type StageCase } from '../../support/gpu.js';
 import { covarianceOf, writeTensors, type TensorSpec, type WrittenTensors } from '../../support/generator-tensors.js';
 import { edgeOnDiscs, hugeSplats, needles, room, thinned, type Scene } from '../../support/scenes.js';

@@ -9,7 +9,7 @@ const KEYS = new Set(['files', 'filenames', 'environment', 'file', 'frames']);
  * names. `missing`: those that are not there or lie outside of the folder, and why. A file that is damaged names none: the page says what is wrong. Needs built packages.
  */
 export async function filesBeside(scene) {
-  const { isInside } = await import('@gaussian-splat/core');
+  const { isInside } = await import('@gaussian-splat/core/contract');
   const [found, missing] = [new Set(), new Map()];
   const visit = async (path) => {
     const folder = posix.dirname(path);
@@ -24,7 +24,7 @@ export async function filesBeside(scene) {
     }
   };
   await visit(basename(scene));
-  const contract = sidecarOf(scene, await import('@gaussian-splat/core'));
+  const contract = sidecarOf(scene, await import('@gaussian-splat/core/contract'));
   if (contract && existsSync(join(dirname(scene), contract))) found.add(contract);
   return { found: [...found], missing: [...missing].map(([file, why]) => `${file} (${why})`) };
 }
@@ -49,7 +49,7 @@ async function buffersOf(file) {
 }
 
 async function weightsOf(file) {
-  const { bytesSource, readOnnxHeader } = await import('@gaussian-splat/core');
+  const { bytesSource, readOnnxHeader } = await import('@gaussian-splat/core/onnx');
   const header = await readOnnxHeader(bytesSource(readFileSync(file), file));
   return header.externalFiles.map(({ location }) => location);
 }

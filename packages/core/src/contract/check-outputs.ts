@@ -2,7 +2,7 @@ import type { Vector3 } from '../vector.js';
 import type { ContractFault } from './contract-error.js';
 import type { Contract } from './contract.js';
 import { checkRow, type RowFault, type RowReader } from './gaussian-values.js';
-import { halfToNumber } from './half.js';
+import { halfToNumber } from '../half.js';
 import { attributeSlices, type AttributeSlice } from './layout.js';
 import { tensorNames } from './parse-contract.js';
 import { bareDims, describeShapes, outputRule, type TensorRule } from './tensor-rules.js';

@@ -3,7 +3,6 @@ export { checkContract } from './check-contract.js';
 export { checkFile, RUNTIME_LIMITS, isInside, type CheckFileOptions } from './check-file.js';
 export { checkBounds, checkOutputs, compareRuns, type OutputReport, type OutputTensor } from './check-outputs.js';
 export { ContractError, describeFault, type ContractErrorData, type ContractFault } from './contract-error.js';
-export { halfToNumber, numberToHalf } from './half.js';
 export { hasInstances, ofInstances, oneInstance, outputsOfInstance } from './instances.js';
 export { gaussianLayout, type AttributeSlice, type GaussianLayout } from './layout.js';
 export { CONTRACT_VERSION, parseContract } from './parse-contract.js';

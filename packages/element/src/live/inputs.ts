@@ -1,4 +1,4 @@
-import type { InputBinding } from '@gaussian-splat/core';
+import type { InputBinding } from '@gaussian-splat/core/contract';
 import type { GeneratorModel } from '@gaussian-splat/generator';
 
 /** What a page may set of a model, from its contract: enough to make controls for visitors. */

@@ -1,5 +1,6 @@
 /** The files of models: their headers, which a worker reads, and what lies beside them. */
-import { GaussianSplatError, type ModelPlace, type OpenedModel } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { ModelPlace, OpenedModel } from '@gaussian-splat/core/onnx';
 import type { ModelSource } from '@gaussian-splat/generator';
 import type { SceneLimits } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';

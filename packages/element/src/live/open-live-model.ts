@@ -10,7 +10,8 @@ import { fetchBeside, readsHeaders } from './model-files.js';
 import { compareOf, offerPanel } from './of-element.js';
 import { StateReader } from './read-state.js';
 import { RunWatch } from './run-watch.js';
-import type { Contract, Vector3 } from '@gaussian-splat/core';
+import type { Vector3 } from '@gaussian-splat/core';
+import type { Contract } from '@gaussian-splat/core/contract';
 import { parseUp } from '../camera/grammar.js';
 import type { SceneBounds } from '../camera/settings.js';
 

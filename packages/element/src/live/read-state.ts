@@ -1,10 +1,5 @@
-import {
-  GaussianSplatError,
-  type Camera,
-  type Contract,
-  type ControlInput,
-  type InputBinding,
-} from '@gaussian-splat/core';
+import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import type { Contract, ControlInput, InputBinding } from '@gaussian-splat/core/contract';
 import type { GeneratorModel, GeneratorState, GpuTensor } from '@gaussian-splat/generator';
 import type { LiveState } from './live-model.js';
 import { valueOf } from './values.js';

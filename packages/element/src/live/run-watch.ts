@@ -1,4 +1,5 @@
-import { ContractError, type Bounds } from '@gaussian-splat/core';
+import type { Bounds } from '@gaussian-splat/core';
+import { ContractError } from '@gaussian-splat/core/contract';
 
 /** After the last run, ms: a look reads all places back, and while runs follow one another there is none. */
 const REST_MS = 700;

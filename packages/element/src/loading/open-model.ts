@@ -1,5 +1,6 @@
 /** Loaded by the worker when the first generator is asked for: headers of models are strangers' files, too. */
-import { GaussianSplatError, openHeader, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { openHeader, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core/onnx';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
 import type { ModelRequest } from './protocol.js';
 

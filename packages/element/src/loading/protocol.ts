@@ -1,5 +1,6 @@
 /** What the page and the scene worker say to each other. */
-import type { ErrorData, ModelPlace } from '@gaussian-splat/core';
+import type { ErrorData } from '@gaussian-splat/core';
+import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';

@@ -2,7 +2,8 @@
  * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
  * {@link loadScene} and the others itself; then nothing here listens.
  */
-import { loadModule, type OpenedModel } from '@gaussian-splat/core';
+import { loadModule } from '@gaussian-splat/core';
+import type { OpenedModel } from '@gaussian-splat/core/onnx';
 import { fetchScene } from '@gaussian-splat/formats';
 import type { DetailManifest } from '@gaussian-splat/renderer';
 import {

@@ -1,4 +1,5 @@
-import { hasInstances, type Contract, type OnnxHeader } from '@gaussian-splat/core';
+import { hasInstances, type Contract } from '@gaussian-splat/core/contract';
+import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { isOnGpu, sameInputs, type InputNumbers, type Inputs, type InputValue } from '../input-value.js';
 
 /** Names of the inputs that have a row for each instance. */

@@ -1,4 +1,4 @@
-import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import { sameInputs, type Inputs } from '../input-value.js';
 import type { GeneratorSession } from '../runtime/generator-session.js';
 import type { RunOutputs, SessionKind } from '../runtime/live-session.js';

@@ -1,11 +1,10 @@
 import {
   ContractError,
-  describeTensor,
   type AttributeSlice,
   type ContractFault,
   type GaussiansInput,
-  type OnnxTensor,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
+import { describeTensor, type OnnxTensor } from '@gaussian-splat/core/onnx';
 import type { GeneratorModel } from '../runtime/open-model.js';
 
 /** An output of one model that is an input of the next; without an output the input is told the number of rows. */

@@ -1,4 +1,5 @@
-import { ContractError, numberToHalf } from '@gaussian-splat/core';
+import { numberToHalf } from '@gaussian-splat/core';
+import { ContractError } from '@gaussian-splat/core/contract';
 import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-buffers.js';
 import { elementsOf, type GpuTensor, type Inputs } from '../input-value.js';
 import type { RunOutputs } from '../runtime/live-session.js';

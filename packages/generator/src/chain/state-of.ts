@@ -1,4 +1,4 @@
-import type { StateInput } from '@gaussian-splat/core';
+import type { StateInput } from '@gaussian-splat/core/contract';
 import type { GpuTensor, Inputs } from '../input-value.js';
 import type { RunOutputs } from '../runtime/live-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';

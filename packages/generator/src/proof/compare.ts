@@ -1,4 +1,5 @@
-import { halfToNumber, type AttributeSlice } from '@gaussian-splat/core';
+import { halfToNumber } from '@gaussian-splat/core';
+import type { AttributeSlice } from '@gaussian-splat/core/contract';
 
 /** A piece of an output that the same run wrote in two places. */
 export interface ComparedPart {

@@ -1,4 +1,6 @@
-import { ContractError, GaussianSplatError, ofInstances, oneInstance, type OnnxHeader } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { ContractError, ofInstances, oneInstance } from '@gaussian-splat/core/contract';
+import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { bindInputs } from '../bind-inputs.js';
 import { bindPictures } from '../bind-pictures.js';
 import type { Inputs } from '../input-value.js';

@@ -1,4 +1,5 @@
-import { ContractError, misfusedProducts } from '@gaussian-splat/core';
+import { ContractError } from '@gaussian-splat/core/contract';
+import { misfusedProducts } from '@gaussian-splat/core/onnx';
 import type { InferenceSession, Tensor } from 'onnxruntime-web/webgpu';
 import {
   elementsOf,

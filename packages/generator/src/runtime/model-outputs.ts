@@ -1,4 +1,5 @@
-import type { Contract, GaussianLayout, OnnxHeader } from '@gaussian-splat/core';
+import type { Contract, GaussianLayout } from '@gaussian-splat/core/contract';
+import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { elementsOf } from '../input-value.js';
 
 /** An output that is asked for. */

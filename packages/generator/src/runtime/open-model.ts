@@ -1,21 +1,17 @@
+import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
 import {
   carriesContract,
   checkContract,
   ContractError,
   gaussianLayout,
-  GaussianSplatError,
   resolveContract,
-  openHeader,
-  partUrl,
   sidecarName,
   type Contract,
   type ContractFault,
   type GaussianLayout,
-  type ModelPlace,
-  type OnnxHeader,
-  type OpenedModel,
   type ResolvedContract,
-} from '@gaussian-splat/core';
+} from '@gaussian-splat/core/contract';
+import { openHeader, type ModelPlace, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core/onnx';
 import { fetchBytes, sumProgress, type FetchOptions, type ProgressListener } from './fetch-bytes.js';
 import { modelOutputs, type ModelOutput } from './model-outputs.js';
 

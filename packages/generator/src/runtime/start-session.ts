@@ -1,4 +1,5 @@
-import { ContractError, constantOutputs, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
+import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
+import { constantOutputs, miscomputedConvolutions } from '@gaussian-splat/core/onnx';
 import { isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
 import type { Evidence } from '../proof/prove.js';
 import { copyOf, evidenceOf, isEqual, readRun, type WrittenRun } from './first-run.js';
