@@ -2,7 +2,7 @@
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { toDegree } from '@gaussian-splat/economise';
-import { readScene } from '@gaussian-splat/formats';
+import { readScene, upright } from '@gaussian-splat/formats';
 import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
@@ -136,8 +136,10 @@ function writeFolder(out, tree, coded, places) {
 
 async function main({ scene, out, degree, geometry, minDecibels, scored, columns, rows, spacing }) {
   const openPart = (path) => readWhole(join(dirname(scene), path));
-  const cloud = toDegree(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
-  sayWarnings(scene, cloud);
+  const read = await readScene(await readWhole(scene), { name: scene, openPart });
+  sayWarnings(scene, read);
+  // Pages have no place for another up.
+  const cloud = upright(toDegree(degree, read));
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();

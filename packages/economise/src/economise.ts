@@ -1,5 +1,5 @@
-import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import { readScene } from '@gaussian-splat/formats';
+import { GaussianSplatError, transposed, type GaussianCloud } from '@gaussian-splat/core';
+import { readScene, turned, uprightRotation } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
 import { findTrades, numbersOf, scaleToFit } from './fit.js';
 import { decibels, errorTogether, meanSquareOf } from './measure.js';
@@ -106,8 +106,8 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
     watch.lap('refine');
   }
   const write = async ({ cut, reduced }: CutCloud, by = encoding): Promise<Written> => {
-    const bytes = await by.write(reduced, pool);
-    const written = await readInParts(bytes, { name: options.name, signal }, pool);
+    const bytes = await by.write({ ...reduced, cloud: { ...reduced.cloud, hints: cloud.hints } }, pool);
+    const written = asGiven(await readInParts(bytes, { name: options.name, signal }, pool), cloud);
     watch.lap('write');
     const errors = await evaluator.compare(written, 'heldOut', signal);
     watch.lap('judge');
@@ -140,6 +140,12 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
     encoding: found.encoding.title,
     seconds: watch.seconds,
   };
+}
+
+/** A written scene in the frame of the one that it was made of: formats without a place for up have it turned. */
+function asGiven(written: GaussianCloud, cloud: GaussianCloud): GaussianCloud {
+  const rotation = written.hints?.up === undefined ? uprightRotation(cloud) : undefined;
+  return rotation ? turned(written, transposed(rotation)) : written;
 }
 
 /** A file, read again and judged. */
@@ -178,7 +184,7 @@ async function chooseEncoding(
   const degrees = new Uint8Array(cloud.count).fill(cloud.shDegree);
   const whole = { cloud, degrees };
   const measure = async (bytes: Uint8Array): Promise<number> => {
-    const rounded = await readScene(bytes, { name: options.name });
+    const rounded = asGiven(await readScene(bytes, { name: options.name }), cloud);
     return errorTogether(await options.evaluator.compare(rounded, 'searched', options.signal), 'searched');
   };
   if (tune) {

@@ -35,4 +35,5 @@ export {
 } from './motion.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
+export { turned, upright, uprightRotation } from './transform/upright.js';
 export { samplePreview } from './preview.js';

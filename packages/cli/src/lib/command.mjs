@@ -28,8 +28,10 @@ export function parseSceneOptions(args, options) {
 }
 
 /** Says on the error stream what of a scene file is not used. */
-export function sayWarnings(scene, { warnings = [] }) {
+export function sayWarnings(scene, { warnings = [], hints }) {
   for (const warning of warnings) console.error(`${scene}: ${warning}`);
+  if (hints?.isUpAssumed)
+    console.error(`${scene}: the file does not name its frame, which is assumed from the marks of its writer`);
 }
 
 /** Whether the file system says it: ENOENT, EACCES, ENOSPC. Its sentence is enough for people. */

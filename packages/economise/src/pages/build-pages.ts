@@ -1,3 +1,4 @@
+import { upright } from '@gaussian-splat/formats';
 import { boundsOf, validateCloud, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import {
   boundLevel,
@@ -56,6 +57,8 @@ export interface DetailTree {
   readonly antialiased: boolean;
   /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
+  /** See `CloudHints.order`. */
+  readonly order?: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
 }
@@ -66,14 +69,15 @@ export interface DetailTreeOptions {
 }
 
 /**
- * The levels of detail of a cloud.
+ * The levels of detail of a cloud. A scene with another up than (0, -1, 0) is turned.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOptions = {}): DetailTree {
   validateCloud(given);
-  const cloud = recentred(given);
+  const standing = upright(given);
+  const cloud = recentred(standing);
   const kept = packedOrder(cloud);
-  const { antialiased, filterVariance, origin } = cloud;
+  const { antialiased, filterVariance, origin, hints } = cloud;
   const shPrecision = choosePrecision(noiseIn(cloud), kept);
   const leaves = leavesOf(cloud, kept, geometry);
   const facts = {
@@ -82,8 +86,9 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
     geometry,
     antialiased,
     filterVariance,
+    order: hints?.order,
     origin,
-    bounds: boundsOf(given),
+    bounds: boundsOf(standing),
   };
   return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
 }
@@ -190,7 +195,7 @@ export function manifestOf(
   coding?: PageCoding,
 ): DetailManifest {
   const stated = coding && statedOf(coding);
-  const { splats, shPrecision, geometry, antialiased, filterVariance, origin, bounds, levels } = tree;
+  const { splats, shPrecision, geometry, antialiased, filterVariance, order, origin, bounds, levels } = tree;
   return {
     ...{
       format: 'gaussian-splat-detail',
@@ -199,7 +204,7 @@ export function manifestOf(
       shDegree: levels[0].shDegree,
     },
     ...{ shPrecision: coding ? 'int8' : shPrecision, ...(geometry && { geometry }), ...(stated && { coding: stated }) },
-    ...{ antialiased, filterVariance, origin, bounds },
+    ...{ antialiased, filterVariance, ...(order && { order }), origin, bounds },
     trees: [
       {
         pages: pages.map(({ chunks, upper, parent }, p) => ({

@@ -26,6 +26,7 @@ export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): Deta
       geometry: tree.geometry,
       antialiased: tree.antialiased,
       filterVariance: tree.filterVariance,
+      order: tree.order,
       origin: tree.origin,
     },
     bounds: boundsAround(tree.bounds, places, radius),

@@ -51,6 +51,7 @@ export async function gatherParts(
     origin: [0, 0, 0],
     antialiased,
     filterVariance: read.find((part) => part.filterVariance !== undefined)?.filterVariance,
+    hints: read.find((part) => part.hints !== undefined)?.hints,
     droppedCount,
     ...(droppedCount > 0 && {
       faults: read[0].faults.map((_, k) => read.reduce((sum, { faults }) => sum + faults[k], 0)),

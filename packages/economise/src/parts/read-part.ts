@@ -12,6 +12,7 @@ export interface PartRead {
   readonly count: number;
   readonly antialiased: boolean;
   readonly filterVariance: number | undefined;
+  readonly hints: GaussianCloud['hints'];
   /** Of its splats: see `GaussianCloud.faults`. */
   readonly faults: readonly number[];
   /** Of the file: see `GaussianCloud.warnings`. */
@@ -26,6 +27,7 @@ export async function readBlocks(
 ): Promise<PartRead> {
   let [count, antialiased] = [0, false];
   let filterVariance: number | undefined;
+  let hints: GaussianCloud['hints'];
   const faults = [0, 0, 0, 0];
   const warnings = new Set<string>();
   for (let at = first; at < end; at += BLOCK) {
@@ -35,10 +37,11 @@ export async function readBlocks(
     count += cloud.count;
     antialiased ||= cloud.antialiased;
     filterVariance ??= cloud.filterVariance;
+    hints ??= cloud.hints;
     cloud.faults?.forEach((number, k) => (faults[k] += number));
     for (const warning of cloud.warnings ?? []) warnings.add(warning);
   }
-  return { count, antialiased, filterVariance, faults, warnings: [...warnings] };
+  return { count, antialiased, filterVariance, hints, faults, warnings: [...warnings] };
 }
 
 /** Reads a part of a file that lies in memory. */

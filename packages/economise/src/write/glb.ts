@@ -1,4 +1,5 @@
-import type { Vector3 } from '@gaussian-splat/core';
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { upright } from '@gaussian-splat/formats';
 import type { WrittenCloud } from './index.js';
 import { arraysOf, columnsOf, type Columns } from '../parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
@@ -26,12 +27,15 @@ interface Primitive {
  * Writes GLB with `KHR_gaussian_splatting`: one primitive for each degree that splats keep, so that coefficients which went take no
  * bytes. Rotations are 16-bit normalised integers, which the extension allows; all else is float32.
  *
+ * A scene with another up than (0, -1, 0) is turned.
+ *
  * @returns the file, in memory that the pool's tasks share
  */
-export async function writeGlb({ cloud, degrees }: WrittenCloud, pool: TaskPool = inline): Promise<Uint8Array> {
+export async function writeGlb({ cloud: given, degrees }: WrittenCloud, pool: TaskPool = inline): Promise<Uint8Array> {
+  const cloud = upright(given);
   const columns = columnsOf(cloud);
   const primitives = [0, 1, 2, 3].flatMap((degree) => primitiveOf(columns, splatsOf(degrees, degree), degree));
-  const { json, byteLength, starts } = describe(primitives, cloud.origin);
+  const { json, byteLength, starts } = describe(primitives, cloud);
   const { bytes, start } = containerOf(json, byteLength, pool);
   const workers = poolFor(pool, cloud.count, arraysOf(columns));
   const inputs = primitives.flatMap(({ degree, splats }, k) =>
@@ -60,8 +64,10 @@ function primitiveOf(columns: Columns, splats: Uint32Array, degree: number): Pri
 /** The file but for its numbers, how many bytes these take, and where among them the attributes of each primitive begin. */
 function describe(
   primitives: readonly Primitive[],
-  origin: Vector3,
+  { origin, hints }: Pick<GaussianCloud, 'origin' | 'hints'>,
 ): { json: object; byteLength: number; starts: number[][] } {
+  // The extension has a value for the usual order alone.
+  const splats = hints?.order ? { ...SPLATS, extras: { sortingMethod: hints.order } } : SPLATS;
   const bufferViews: object[] = [];
   const accessors: object[] = [];
   let byteLength = 0;
@@ -85,7 +91,7 @@ function describe(
   const meshPrimitives = primitives.map((primitive, k) => ({
     mode: 0,
     attributes: Object.fromEntries(primitive.columns.map((column) => [column.name, add(column, primitive, k)])),
-    extensions: { [EXTENSION]: SPLATS },
+    extensions: { [EXTENSION]: splats },
   }));
   const json = {
     asset: { version: '2.0', generator: 'gaussian-splat economise' },

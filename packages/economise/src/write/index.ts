@@ -67,15 +67,18 @@ const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
  * The ways to write a file of this name; of `lod-meta.json`, an archive of a folder: see {@link filesOfZip}.
  * @param cloud what is to be written, as far as it is known
  * @param encoders what `.sog` is written with
- * @throws GaussianSplatError `argument/value` for a name with an unknown extension, for a scene trained with antialiasing where the format cannot say so, and for one
+ * @throws GaussianSplatError `argument/value` for a name with an unknown extension, for a scene trained with a filter that the format cannot name, and for one
  * that lies farther from (0, 0, 0) than the format has digits.
  */
 export function encodingsFor(
   name: string,
-  cloud: Partial<Pick<GaussianCloud, 'antialiased' | 'positions' | 'origin'>> = {},
+  cloud: Partial<Pick<GaussianCloud, 'antialiased' | 'filterVariance' | 'positions' | 'origin'>> = {},
   encoders: Encoders = {},
 ): readonly Encoding[] {
-  if (isLodIndex(name)) return [tuneSog(encoders.encodeWebp, true)];
+  if (isLodIndex(name)) {
+    requireFilter(name, '.sog', cloud);
+    return [tuneSog(encoders.encodeWebp, true)];
+  }
   const extension = /\.[a-z]+$/i.exec(name)?.[0].toLowerCase() ?? '';
   const found = extension === '.sog' ? [tuneSog(encoders.encodeWebp)] : ENCODINGS.get(extension);
   if (found === undefined) {
@@ -87,16 +90,41 @@ export function encodingsFor(
         'choose .glb for accuracy, .sog for size, lod-meta.json in a folder for streaming, .ply for tools that know nothing else',
     });
   }
-  if (cloud.antialiased && extension === '.glb') {
-    throw new GaussianSplatError('argument/value', {
-      where: name,
-      expected: 'a format that tells of scenes trained with antialiasing: .ply or .spz',
-      found: 'KHR_gaussian_splatting, which has no place for it',
-      remedy: 'choose .ply for accuracy, .spz for size',
-    });
-  }
+  requireFilter(name, extension, cloud);
   const { positions, origin } = cloud;
   if (positions && extension === '.glb' && isOfPlanes(positions)) return [GLB_OF_PLANES];
   if (positions && origin && extension === '.spz') fractionalBitsOf({ positions, origin });
   return found;
+}
+
+type Filter = Partial<Pick<GaussianCloud, 'antialiased' | 'filterVariance'>>;
+
+/** Variance in px² that scenes have without another word. */
+const USUAL_VARIANCE = 0.3;
+/** Variance in px² of what SOG calls `model: antialiased`. */
+const MIP_VARIANCE = 0.1;
+
+/** Filters that a format can name. */
+const HOLDS_FILTER: Readonly<Record<string, (isCompensated: boolean, variance: number) => boolean>> = {
+  '.ply': () => true,
+  '.spz': (_, variance) => variance === USUAL_VARIANCE,
+  '.glb': (isCompensated, variance) => !isCompensated && variance === USUAL_VARIANCE,
+  '.sog': (isCompensated, variance) => variance === USUAL_VARIANCE || (isCompensated && variance === MIP_VARIANCE),
+};
+
+/** Throws `argument/value` if a scene would be read with another low-pass filter than it was trained with. */
+function requireFilter(
+  name: string,
+  extension: string,
+  { antialiased = false, filterVariance = USUAL_VARIANCE }: Filter,
+): void {
+  const isHeldBy = (other: string): boolean => HOLDS_FILTER[other](antialiased, filterVariance);
+  if (isHeldBy(extension)) return;
+  const others = ['.sog', '.spz', '.ply'].filter(isHeldBy);
+  throw new GaussianSplatError('argument/value', {
+    where: name,
+    expected: `a format that can name the filter of the scene: ${others.join(', ')}`,
+    found: `${extension}, which has no place for ${filterVariance} px²${antialiased ? ' with compensation (antialiasing)' : ''}`,
+    remedy: `choose ${others.join(' or ')}`,
+  });
 }

@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 
-/** Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals; places in float64 where the cloud lies so far from (0, 0, 0) that float32 does not hold them. */
+/** Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up and order; places in float64 where the cloud lies so far from (0, 0, 0) that float32 does not hold them. */
 export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
   const {
     count,
@@ -13,6 +13,7 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     rotations,
     antialiased,
     filterVariance = 0.3,
+    hints,
   } = cloud;
   const coefficients = shCoefficientCount(shDegree);
   const isFar = origin.some((x) => x !== 0);
@@ -24,7 +25,10 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
   const lines = [
     'ply',
     'format binary_little_endian 1.0',
-    ...(antialiased ? ['comment SplatRenderMode: mip', `comment filter_variance ${filterVariance}`] : []),
+    ...(antialiased ? ['comment SplatRenderMode: mip'] : []),
+    ...(antialiased || filterVariance !== 0.3 ? [`comment filter_variance ${filterVariance}`] : []),
+    ...(hints?.up ? [`comment Vertical axis: ${hints.up.join(' ')}`] : []),
+    ...(hints?.order ? [`comment sorting_method ${hints.order}`] : []),
     `element vertex ${count}`,
     ...names.map((name, k) => `property ${isFar && k < 3 ? 'double' : 'float'} ${name}`),
     'end_header',

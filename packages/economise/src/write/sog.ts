@@ -1,4 +1,5 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer';
 import type { SeenSplats } from '../pages/seen-splats.js';
 import type { Steps } from '../steps.js';
@@ -45,8 +46,9 @@ const PALETTE_ROW = 64;
 const MOST_CODES = 255;
 const LN2 = Math.LN2;
 
-/** Writes SOG version 2 as a bundle. */
-export async function writeSog(cloud: GaussianCloud, options: SogOptions): Promise<Uint8Array<ArrayBuffer>> {
+/** Writes SOG version 2 as a bundle. A scene with another up than (0, -1, 0) is turned. */
+export async function writeSog(given: GaussianCloud, options: SogOptions): Promise<Uint8Array<ArrayBuffer>> {
+  const cloud = upright(given);
   const order = packedOrder(cloud);
   if (order.length === 0) throw nothingToWrite();
   return writeZip(await sogFiles(cloud, order, options));
@@ -90,6 +92,7 @@ export async function sogFiles(
     count: order.length,
     ...(cloud.antialiased && { antialias: true }),
     ...(cloud.antialiased && cloud.filterVariance === 0.1 && { model: 'antialiased' }),
+    ...(cloud.hints?.order && { sortingMethod: cloud.hints.order }),
     means: { ...means, files: ['means_l.webp', 'means_u.webp'] },
     scales: { codebook: scales.values, files: ['scales.webp'] },
     quats: { files: ['quats.webp'] },

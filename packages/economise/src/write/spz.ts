@@ -1,4 +1,5 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { upright } from '@gaussian-splat/formats';
 
 /** How precisely an SPZ is written. */
 export interface SpzOptions {
@@ -13,18 +14,23 @@ const MOST_STEPS = 2 ** 23 - 1;
 
 /** The frame of the numbers, a cloud's own, which current converters keep and expect: right, down, forward is system 6 of the extension 0xADBE0003. */
 const FRAME = [0xadbe0003, 4, 6];
+/** Our own record, docs/decisions/0022-the-frame-of-spz.md: 1 for splats ordered at each pixel. */
+const PIXEL_ORDER = [0x47530001, 4, 1];
 const FLAG_ANTIALIASED = 1;
 const FLAG_EXTENSIONS = 2;
 
 /**
  * Writes SPZ version 3 (Niantic) in the frame of PLY, which it names, with as many bits after the point of the coordinates as 24 bits allow.
+ * A scene with another up than (0, -1, 0) is turned.
  * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607
  */
-export async function writeSpz(cloud: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
+export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
+  const cloud = upright(given);
   const { count, shDegree, antialiased } = cloud;
+  const records = [...FRAME, ...(cloud.hints?.order === 'pixel' ? PIXEL_ORDER : [])];
   const coefficients = shCoefficientCount(shDegree) - 1;
   const fractionalBits = fractionalBitsOf(cloud);
-  const body = new Uint8Array(16 + count * (20 + 3 * coefficients) + 4 * FRAME.length);
+  const body = new Uint8Array(16 + count * (20 + 3 * coefficients) + 4 * records.length);
   const view = new DataView(body.buffer);
   // "NGSP", version, count.
   [0x5053474e, 3, count].forEach((value, k) => view.setUint32(4 * k, value, true));
@@ -35,7 +41,7 @@ export async function writeSpz(cloud: GaussianCloud, options: SpzOptions): Promi
   for (const scale of cloud.scales) body[at++] = byte(16 * (Math.log(scale) + 10));
   for (let i = 0; i < count; i++, at += 4) view.setUint32(at, packRotation(cloud.rotations, 4 * i), true);
   at = packHarmonics(cloud, options.shBits, body, at);
-  FRAME.forEach((value, k) => view.setUint32(at + 4 * k, value, true));
+  records.forEach((value, k) => view.setUint32(at + 4 * k, value, true));
   return gzip(body);
 }
 

@@ -1,4 +1,5 @@
 import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
+import { upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer';
 import { buildLevels, recentred, type SplatLevel } from '@gaussian-splat/renderer/stages';
 import { nothingToWrite, sogFiles, type SogOptions } from './sog.js';
@@ -32,6 +33,7 @@ interface Run {
 
 /**
  * Writes streamed SOG: an index, `lod-meta.json`, and SOG files of some boxes at one level of detail each. Each level has a quarter of the splats of the one before.
+ * A scene with another up than (0, -1, 0) is turned.
  * @returns files by their paths; the index is the last
  * @throws GaussianSplatError `argument/cloud` for a scene without a splat that can be drawn
  */
@@ -39,7 +41,7 @@ export async function writeStreamedSog(
   given: GaussianCloud,
   options: SogOptions,
 ): Promise<ReadonlyMap<string, Uint8Array>> {
-  const cloud = recentred(given);
+  const cloud = recentred(upright(given));
   const order = packedOrder(cloud);
   if (order.length === 0) throw nothingToWrite();
   const boxes = boxesOf(cloud, order);

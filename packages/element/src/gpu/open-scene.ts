@@ -180,7 +180,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     const { gaussians, detail } = await openStreamed(request, lease.device, {
       ...{ loader, signal, onProgress, memoryBudget, onChange },
     });
-    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, { detail });
+    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, { detail, order: gaussians.order });
     return scene;
   } catch (error) {
     lease.release();

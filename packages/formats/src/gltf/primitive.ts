@@ -69,6 +69,8 @@ export async function readPrimitive(
   const splats = splatsOf(primitive);
   const cloud = await readNumbers(document, primitive, path, source, range);
   noteUnknown(cloud, splats);
+  const { extras } = splats;
+  if (isObject(extras) && extras.sortingMethod === 'pixel') cloud.hints = { order: 'pixel' };
   return cloud;
 }
 

@@ -13,6 +13,8 @@ export interface SogMeta {
   readonly antialiased: boolean;
   /** Variance of the filter where the file tells it; splat-transform 3 says `model: antialiased` of what PLY calls `SplatRenderMode: mip`. */
   readonly filterVariance: number | undefined;
+  /** What our own writer says of scenes that are ordered pixel by pixel: `sortingMethod: pixel`. */
+  readonly order: 'pixel' | undefined;
   readonly means: {
     readonly mins: readonly number[];
     readonly maxs: readonly number[];
@@ -82,6 +84,7 @@ export function parseSogMeta(source: JsonSource): SogMeta {
     count: count as number,
     antialiased: json.antialias === true || json.model === 'antialiased',
     filterVariance: json.model === 'antialiased' ? 0.1 : undefined,
+    order: json.sortingMethod === 'pixel' ? 'pixel' : undefined,
     means: { mins: numbers('means', 'mins', 3), maxs: numbers('means', 'maxs', 3), files: files('means', 2) },
     scales: { values: isFirst ? between('scales', 3) : repeated(codebook('scales'), 3), files: files('scales', 1) },
     quats: { files: files('quats', 1) },

@@ -98,6 +98,7 @@ function unpackGeometry(
   const cloud = allocateCloud(selection.count, degree, source);
   cloud.antialiased = meta.antialiased;
   cloud.filterVariance = meta.filterVariance;
+  if (meta.order) cloud.hints = { order: meta.order };
   unpackMeans(planes.low, planes.high, meta.means, selection, cloud.positions);
   unpackScales(planes.scales, meta.scales, selection, cloud.scales);
   unpackQuats(planes.quats, selection, cloud.rotations);

@@ -14,6 +14,8 @@ export const RIGHT_DOWN_FORWARD: AxisSigns = [1, 1, 1];
 const COORDINATE_SYSTEM = 0xadbe0003;
 /** Padding; and Adobe's limits of an orbiting camera, which change no splat. */
 const MEANINGLESS = new Set([0, 0xadbe0002]);
+/** Our own record of the order of splats: 1 for pixel by pixel. */
+const ORDER = 0x47530001;
 const MOST_SKIPPED = 8;
 /** Bits after the point that all converters write. */
 const USUAL_FRACTIONAL_BITS = 12;
@@ -24,6 +26,7 @@ export interface SpzFrame {
   readonly turn?: readonly number[] | undefined;
   /** The file names no frame. */
   readonly isAssumed?: boolean | undefined;
+  readonly order?: 'pixel' | undefined;
 }
 
 /**
@@ -49,16 +52,19 @@ export function readExtensions(
   const view = viewOf(records);
   const skipped = new Set<number>();
   let frame: SpzFrame | undefined;
+  let order: 'pixel' | undefined;
   for (let at = 0; at + 8 <= records.length;) {
     const type = view.getUint32(at, true);
     const length = view.getUint32(at + 4, true);
     if (at + 8 + length > records.length) break;
     if (type === COORDINATE_SYSTEM && length >= 4) frame ??= frameOfSystem(view.getUint32(at + 8, true), name);
+    else if (type === ORDER && length >= 4) order = view.getUint32(at + 8, true) === 1 ? 'pixel' : undefined;
     else if (!MEANINGLESS.has(type) && skipped.size < MOST_SKIPPED) skipped.add(type);
     at += 8 + length;
   }
   return {
     ...(frame ?? { axes: assumedAxes(header), isAssumed: !header.followsSpecification }),
+    order,
     skipped: [...skipped],
   };
 }

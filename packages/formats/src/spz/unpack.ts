@@ -13,12 +13,12 @@ const COLOUR_SCALE = 0.15;
 /** Unpacks all attributes into a cloud (the definition is `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
 export function unpackSplats(
   header: SpzHeader,
-  { attributes, axes, isAssumed, skipped = [] }: PackedScene,
+  { attributes, axes, isAssumed, order, skipped = [] }: PackedScene,
   source: Pick<SceneSource, 'budget' | 'name'>,
 ): GaussianCloud {
   const cloud = allocateCloud(header.count, keptDegree(header.degree), source);
   cloud.antialiased = header.antialiased;
-  if (isAssumed) cloud.hints = { isUpAssumed: true };
+  if (isAssumed || order) cloud.hints = { ...(isAssumed && { isUpAssumed: true }), ...(order && { order }) };
   if (header.degree === 4) warn(cloud, DEGREE_4);
   for (const type of skipped) warn(cloud, `The SPZ extension 0x${type.toString(16)} is not known and is left out.`);
   if (header.version === 1) unpackHalfPositions(attributes.positions, axes, cloud.positions);

@@ -57,7 +57,7 @@ export function layOutLevels(
   const cloud = recentred(coarsest);
   const usable = usableIndices(cloud);
   const { sh = 'auto' } = options;
-  const { shDegree, antialiased, filterVariance, origin } = cloud;
+  const { shDegree, antialiased, filterVariance, origin, hints } = cloud;
   const shPrecision = sh === 'auto' ? choosePrecision(noiseIn(cloud), usable) : sh;
   const bounds = boundsWithin(coarsest, boxes.length);
   const kept = keptOfNodes(cloud, usable, boxes.length);
@@ -83,7 +83,7 @@ export function layOutLevels(
     runs.push({ ...packed, sphere: sphereAround(packed.chunks), error: 0 });
   }
   const splats = boxes.reduce((sum, { counts }) => sum + counts.at(-1)!, around.length);
-  const scene = { ...format, splats, antialiased, filterVariance, origin, bounds };
+  const scene = { ...format, splats, antialiased, filterVariance, order: hints?.order, origin, bounds };
   const firstChunks = runs.slice(0, boxes.length).map(({ chunks }) => chunks.length / CHUNK_NUMBERS);
   return { scene, first: joinSlots(runs, scene), firstChunks, pages };
 }

@@ -58,6 +58,8 @@ export interface DetailManifest {
   readonly antialiased: boolean;
   /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
+  /** Order of splats that the scene was trained with; undefined is that of their centers. */
+  readonly order?: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly trees: readonly Tree[];
@@ -121,6 +123,8 @@ export function checkManifest(value: unknown, where: string, mostPages = MOST_PA
   if (filterVariance !== undefined && !(filterVariance >= 0 && filterVariance <= 1)) {
     fail('filterVariance', 'a variance of 0 to 1 px², or nothing', filterVariance);
   }
+  const { order } = manifest;
+  if (order !== undefined && order !== 'pixel') fail('order', 'pixel, or nothing', order);
   if (!isVector(origin)) fail('origin', '3 numbers', origin);
   const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);
   if (!hasBounds || !Number.isFinite(bounds?.radius)) fail('bounds', 'min, max, center and radius', bounds);

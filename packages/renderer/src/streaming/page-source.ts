@@ -8,7 +8,7 @@ import { chunkLayout, type SlotWords } from './slot-words.js';
 
 /** What is known of a streamed scene before any page of it has come. */
 export type StreamedScene = PageFormat &
-  Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'origin' | 'bounds'>;
+  Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'order' | 'origin' | 'bounds'>;
 
 /** A streamed scene, and where its pages come from. */
 export interface PageSource {

@@ -86,6 +86,8 @@ export class StreamedGaussians implements GaussianScene {
   readonly antialiased: boolean;
   /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
+  /** See `CloudHints.order`. */
+  readonly order: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly pages: readonly GaussianPage[];
@@ -111,7 +113,8 @@ export class StreamedGaussians implements GaussianScene {
 
   private constructor(device: GPUDevice, source: PageSource, options: PoolOptions) {
     const { scene, list } = source;
-    const { shDegree, shPrecision, antialiased, filterVariance, origin, bounds } = scene;
+    const { shDegree, shPrecision, antialiased, filterVariance, order, origin, bounds } = scene;
+    this.order = order;
     [this.shDegree, this.shPrecision, this.antialiased, this.filterVariance, this.origin] = [
       shDegree,
       shPrecision,
