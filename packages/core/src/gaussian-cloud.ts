@@ -40,7 +40,7 @@ export interface LevelRun {
 /** What a file says about itself beside its numbers. */
 export interface CloudHints {
   /** The direction of the cloud's frame that points up, of length 1. */
-  readonly up?: Vector3;
+  readonly up?: Vector3 | undefined;
   /** Whether the file names no frame, so that the direction of up was assumed from the marks of its writer. */
   readonly isUpAssumed?: boolean;
   /** The tool that wrote the file, in its own words. */

@@ -37,6 +37,5 @@ export function turned(cloud: GaussianCloud, rotation: Matrix3): GaussianCloud {
 export function upright(cloud: GaussianCloud): GaussianCloud {
   const rotation = uprightRotation(cloud);
   if (rotation === undefined) return cloud;
-  const { up: _, ...hints } = cloud.hints ?? {};
-  return { ...turned(cloud, rotation), hints };
+  return { ...turned(cloud, rotation), hints: { ...cloud.hints, up: undefined } };
 }
