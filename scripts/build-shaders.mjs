@@ -18,14 +18,14 @@ const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
-  'probe-shaders': ['probe_depth'],
+  'probe-shaders': ['probe_depth', 'probe_surface', 'probe_surface_quantized'],
   'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
   'linear-shaders': ['compose_linear'],
   'order-shaders': ['pixel_depths', 'pixel_depths_quantized', 'rasterize_tiles_order'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
 const QUANTIZED = {
-  stages: ['cull', 'cull_serial', 'pixel_depths', 'project'],
+  stages: ['cull', 'cull_serial', 'pixel_depths', 'probe_surface', 'project'],
   replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
 };
 /** Those of another package, which takes shared parts from the renderer. */

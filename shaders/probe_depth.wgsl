@@ -1,6 +1,7 @@
 // What lies under single points of the last frame: picking, and labels that scenery hides. One workgroup a point; each
 // lane walks one run of the splats, from near to far, so that a prefix product of 64 runs is all that is left to join.
 #import shared/probe
+#import shared/probe_answer
 #import shared/plan
 
 @group(0) @binding(0) var<storage, read> plan: Plan;
@@ -9,16 +10,6 @@
 @group(0) @binding(2) var<storage, read> order: array<u32>;
 @group(0) @binding(3) var<storage, read> points: array<ProbePoint>;
 @group(0) @binding(4) var<storage, read_write> answers: array<ProbeAnswer>;
-
-struct ProbeAnswer {
-  // 1 - transmittance of all splats.
-  opacity: f32,
-  // Depth of the splat behind which less than half of the light is left; 0 where more than half passes all.
-  median_depth: f32,
-  // Transmittance of the splats in front of the point's depth.
-  in_front: f32,
-  unused: f32,
-}
 
 const PROBE_LANES = 64u;
 
@@ -45,24 +36,32 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   if (lane != 0u) { return; }
   var in_front = 1.0;
   for (var run = 0u; run < PROBE_LANES; run++) { in_front *= runs_in_front[run]; }
+  var answer = ProbeAnswer(vec3f(0.0), 0.0, vec3u(0u), in_front);
+  for (var level = 0u; level < PROBE_LEVELS; level++) { find(&answer, point, level, length); }
+  answers[workgroup_id.x] = answer;
+}
+
+// The first splat, from near to far, behind which less than a share of the light is left.
+fn find(answer: ptr<function, ProbeAnswer>, point: ProbePoint, level: u32, length: u32) {
+  let share = light_left(level);
   var total = 1.0;
   var before = 1.0;
   var crossing = PROBE_LANES;
   for (var run = 0u; run < PROBE_LANES; run++) {
-    if (crossing == PROBE_LANES && total * runs[run] < 0.5) {
+    if (crossing == PROBE_LANES && total * runs[run] < share) {
       crossing = run;
       before = total;
     }
     total *= runs[run];
   }
-  var median = 0.0;
+  (*answer).opacity = 1.0 - total;
   for (var rank = crossing * length; rank < min((crossing + 1u) * length, plan.visible); rank++) {
     let s = splats[order[rank]];
     before *= passes(s, point);
-    if (before < 0.5) {
-      median = splat_depth(s);
-      break;
+    if (before < share) {
+      (*answer).depths[level] = splat_depth(s);
+      (*answer).slots[level] = order[rank];
+      return;
     }
   }
-  answers[workgroup_id.x] = ProbeAnswer(1.0 - total, median, in_front, 0.0);
 }

@@ -18,7 +18,7 @@ export const WEBGL_SHADERS = fileURLToPath(new URL('../../packages/renderer/src/
 
 /** What stands in the place of WebGPU's buffers. */
 const REPLACED = { 'shared/stored_gaussian': 'webgl/textured_gaussian' };
-const STAGES = ['project', 'quads', 'compose', 'probe'];
+const STAGES = ['project', 'quads', 'compose', 'probe', 'probe_surface'];
 /** What a stage takes as it is from WebGPU's. */
 const SHARED = ['full_screen'];
 const ENTRIES = [['full_screen', 'vertex'], ['quads', 'vertex'], ...STAGES.map((stage) => [stage, 'fragment'])];

@@ -100,4 +100,45 @@ for (const unit of [1e-8, 1e-5, 1e5, 1e9]) {
   });
 }
 
+for (const sigma of [0.03, 0.1, 0.3]) {
+  test(`a floor of splats of ${100 * sigma} cm is found at its height, not at the depth of the nearest center`, async () => {
+    const device = await serialDevice();
+    const step = 0.8 * sigma;
+    const across = Math.ceil(8 / step);
+    const floor = repeat(across * across, (i) => ({
+      position: [((i % across) - across / 2) * step, 1.6, 0.5 + Math.floor(i / across) * step] as const,
+      scale: [sigma, 0.002, sigma] as const,
+      opacity: 0.9,
+      color: [1, 1, 1] as const,
+    }));
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(cloudOf(floor)));
+    const renderer = new Renderer(device);
+    // The eye is 1.6 m above the floor, which is at y = 1.6: y points down.
+    const camera = { ...cameraAt([0, 0, 0], [0, 1.6, 4], { width: 480, height: 360 }), near: 0.1 };
+    await capture(device, renderer, { gaussians, camera });
+    const points = Array.from({ length: 120 }, (_, i) => ({
+      x: 60.5 + 30 * (i % 12),
+      y: 169.5 + 15 * Math.floor(i / 12),
+    }));
+    const [, down, forward] = [0, 1, 2].map((row) => camera.worldToCamera.slice(4 * row, 4 * row + 3));
+    const errors = (await renderer.probe(points)).map(({ depth, near, far }, i) => {
+      const { x, y } = points[i];
+      const right = camera.worldToCamera.slice(0, 3);
+      const ray = [0, 1, 2].map(
+        (k) => ((x - camera.cx) / camera.fx) * right[k] + ((y - camera.cy) / camera.fy) * down[k] + forward[k],
+      );
+      assert.ok(depth !== null && near !== null && far !== null, `point ${i} is on the floor`);
+      assert.ok(near <= far + 0.05 * far, `${near} to ${far}`);
+      return Math.abs(depth - 1.6 / ray[1]) * Math.hypot(...ray);
+    });
+    errors.sort((a, b) => a - b);
+    assert.ok(errors[60] < 0.01 && errors[114] < 0.02, `median ${errors[60]} m, 95 % ${errors[114]} m`);
+    // The image is what it was: the order that the probe needs for a moment is back.
+    const again = await renderer.probe(points.slice(0, 3));
+    assert.equal(again.length, 3);
+    renderer.destroy();
+    gaussians.destroy();
+  });
+}
+
 after(endNodeDevice);

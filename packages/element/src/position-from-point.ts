@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
@@ -36,11 +36,15 @@ export async function positionFromPoint(host: QueryHost, clientX: number, client
   try {
     const [answer] = await host.probe([{ x, y }]);
     if (!answer || answer.depth === null) return null;
-    const point = unproject(drawn, { x, y, depth: answer.depth });
-    return new ScenePoint(...toViewer(camera.viewerFrame, point));
+    const { near, depth, far } = answer;
+    const at = (z: number): Vector3 => unproject(drawn, { x, y, depth: z });
+    const uncertainty = far === null ? Infinity : distance(at(near ?? depth), at(far)) / 2;
+    return new ScenePoint(...toViewer(camera.viewerFrame, at(depth)), uncertainty);
   } catch (error) {
     // A device that was lost meanwhile has nothing more to say, and its loss is told elsewhere.
     if (await isGone(painter)) return null;
     throw error;
   }
 }
+
+const distance = (a: Vector3, b: Vector3): number => Math.hypot(...subtract(a, b));

@@ -116,7 +116,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /**
    * The visible surface of the scene under a point of the page: what `data-position` and `camera-target` take. Asks the GPU, beside the
-   * frames; to about a thousandth of the distance.
+   * frames. `uncertainty` of the point says how far the surface spreads along the line of sight.
    * @param clientX CSS pixels, as of a MouseEvent.
    * @returns null beside the scene, and where it is more transparent than not.
    */

@@ -1,6 +1,8 @@
-import { probeDepth } from './generated/probe-shaders.js';
+import type { FrameBindings, Stages } from './bindings.js';
+import { recordSurvivors } from './frame.js';
+import { probeDepth, probeSurface, probeSurfaceQuantized } from './generated/probe-shaders.js';
 import { layouts } from './generated/shaders.js';
-import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources } from './gpu/kernel.js';
+import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources, type ShaderDescription } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 
 /** A point of the image that was drawn last. */
@@ -18,20 +20,22 @@ export interface ProbeAnswer {
   /** 0..1: how opaque the image is there. */
   readonly opacity: number;
   /**
-   * Depth along the camera's axis, in world units and to 11 bits, of the splat behind which less than half of the light is left:
-   * the visible surface. Null where the splats let more than half of it pass.
+   * Depth along the camera's axis, in world units, of the visible surface: at which the splat is densest, along the ray of the point, behind which less than half
+   * of the light is left. Null if the splats let more than half of it pass.
    */
   readonly depth: number | null;
+  /** The same for 90 % of the light: the first thing that is noticeable. Null if more passes. */
+  readonly near: number | null;
+  /** The same for 10 % of the light. Null if more passes. `far - near` tells how thick the surface is. */
+  readonly far: number | null;
   /** 0..1: light that the splats in front of the point's own depth let pass. 1: nothing hides it. */
   readonly transmittance: number;
 }
 
-/** The frame to look into: where it lies on the GPU. */
+/** The frame to look into. */
 export interface ProbeSource {
-  readonly plan: GPUBuffer;
-  readonly splats: GPUBuffer;
-  /** Slots from near to far. */
-  readonly order: GPUBuffer;
+  readonly stages: Stages;
+  readonly bindings: FrameBindings;
 }
 
 /** Opacity and depth under single points of the last frame; a workgroup a point. */
@@ -70,11 +74,20 @@ export async function probe(
     const asked = memory.buffer('gs.probe_depth.points', words.byteLength, storage, new Uint32Array(words.buffer));
     const answers = memory.buffer('gs.probe_depth.answers', bytes, storage | copySource);
     const staging = memory.buffer('gs.probe_depth.staging', bytes, mapRead | copyDestination);
+    const { plan, splats, order } = source.bindings.scratch;
+    // The list of survivors, which the surfaces need, takes the place of the order for a moment.
+    const kept = memory.buffer('gs.probe_depth.order', order[0].size, copySource | copyDestination);
     const stage = new ProbeDepthStage(device);
     const encoder = device.createCommandEncoder({ label: 'gs.probe_depth' });
     const pass = encoder.beginComputePass({ label: 'gs.probe_depth' });
-    stage.record(pass, stage.bind({ ...source, points: asked, answers }), points.length);
+    stage.record(pass, stage.bind({ plan, splats, order: order[0], points: asked, answers }), points.length);
     pass.end();
+    encoder.copyBufferToBuffer(order[0], 0, kept, 0, kept.size);
+    const surfaces = encoder.beginComputePass({ label: 'gs.probe_surface' });
+    recordSurvivors(surfaces, source);
+    recordSurfaces(device, surfaces, source.bindings, { points: asked, answers, count: points.length });
+    surfaces.end();
+    encoder.copyBufferToBuffer(kept, 0, order[0], 0, kept.size);
     encoder.copyBufferToBuffer(answers, 0, staging, 0, bytes);
     device.queue.submit([encoder.finish()]);
     await staging.mapAsync(0x1);
@@ -84,10 +97,30 @@ export async function probe(
   }
 }
 
+/** Either of the two shaders. */
+type SurfaceShader = ShaderDescription & Pick<typeof probeSurface, 'bindings'>;
+
+/** Replaces depths of centers by those of surfaces, page after page. */
+function recordSurfaces(
+  device: GPUDevice,
+  pass: GPUComputePassEncoder,
+  { table, scratch }: FrameBindings,
+  { points, answers, count }: { points: GPUBuffer; answers: GPUBuffer; count: number },
+): void {
+  const { order, plan } = scratch;
+  table.pages.forEach((page, i) => {
+    const kernel = kernelOf<SurfaceShader>(device, page.reading ? probeSurfaceQuantized : probeSurface);
+    const gaussians = page.geometry;
+    const group = kernel.bind({ view: table.view(i), gaussians, survivors: order[0], plan, points, answers });
+    kernel.dispatch(pass, group, count);
+  });
+}
+
 function readAnswers(values: Float32Array, count: number): ProbeAnswer[] {
   return Array.from({ length: count }, (_, i) => {
-    const [opacity, depth, transmittance] = values.subarray(i * WORDS_PER_ANSWER, (i + 1) * WORDS_PER_ANSWER);
-    return { opacity, depth: depth > 0 ? depth : null, transmittance };
+    const [near, depth, far, opacity, , , , transmittance] = values.subarray(i * WORDS_PER_ANSWER);
+    const [nearest, surface, farthest] = [near, depth, far].map((value) => (value > 0 ? value : null));
+    return { opacity, depth: surface, near: nearest, far: farthest, transmittance };
   });
 }
 

@@ -74,13 +74,19 @@ function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: reado
   }
 }
 
+/** Lists the visible splats of the last frame once more, in the place of their order: the same as in that frame. */
+export function recordSurvivors(pass: GPUComputePassEncoder, frame: Pick<Frame, 'stages' | 'bindings'>): void {
+  cull(pass, frame);
+  listSurvivors(pass, frame);
+}
+
 /** Finds the visible splats: whole chunks first, then one by one. */
-function cull(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
+function cull(pass: GPUComputePassEncoder, { stages, bindings }: Pick<Frame, 'stages' | 'bindings'>): void {
   for (const { cullChunks, splatCount } of bindings.pages) stages.cullChunks.record(pass, cullChunks, splatCount);
   for (const { reading, cull: bound, splatCount } of bindings.pages) reading.cull.record(pass, bound, splatCount);
 }
 
-function listSurvivors(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
+function listSurvivors(pass: GPUComputePassEncoder, { stages, bindings }: Pick<Frame, 'stages' | 'bindings'>): void {
   stages.plan.record(pass, bindings.plan);
   for (const { compact, splatCount } of bindings.pages) stages.compact.record(pass, compact, splatCount);
 }

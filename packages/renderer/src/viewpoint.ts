@@ -1,7 +1,7 @@
 import { loadModule, validateCamera, type Camera } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
 import { makeStages, type Stages } from './bindings.js';
-import type { ProbeAnswer, ProbePoint } from './depth-probe.js';
+import type { ProbeAnswer, ProbePoint, ProbeSource } from './depth-probe.js';
 import { recordProjection } from './frame.js';
 import { FrameResources, type Resources } from './frame-resources.js';
 import type { PageRequests } from './gaussian-scene.js';
@@ -18,7 +18,6 @@ import type { AuxiliaryFrame, Painting, Rasterizer, RasterizerName } from './ras
 import { AuxiliaryPainter } from './rasterizers/tile-painter.js';
 import { TilesRasterizer } from './rasterizers/tiles.js';
 import { requireBlendable, requireTextureSize } from './requirements.js';
-import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
@@ -109,7 +108,7 @@ export class UncheckedViewpoint {
   /** Whether the last frame had to do without the code for its order. */
   #lacksOrder = false;
   /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
-  #last: { readonly scratch: Scratch; readonly scale: number } | undefined;
+  #last: (ProbeSource & { readonly scale: number }) | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if settings need a feature that the device lacks. */
   constructor(device: GPUDevice, world: World, { settings = {}, onIncomplete }: ViewpointOptions = {}) {
@@ -277,7 +276,7 @@ export class UncheckedViewpoint {
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
     const how = { levers, timer, ...this.#wayToPaint(picture, levers, drawn, scratch, order) };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);
-    this.#last = { scratch, scale: drawn.width / camera.width };
+    this.#last = { stages, bindings, scale: drawn.width / camera.width };
     return { last, isWatched, submissions, wishes, resources };
   }
 
@@ -352,11 +351,10 @@ export class UncheckedViewpoint {
    */
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
     const { probe } = await loadModule('the code that measures depth', () => import('./depth-probe.js'));
-    if (this.#last === undefined || this.#last.scratch !== this.#engine.resources.current?.scratch) return [];
-    const { scale, scratch } = this.#last;
-    const { plan, splats, order } = scratch;
+    if (this.#last === undefined || this.#last.bindings.scratch !== this.#engine.resources.current?.scratch) return [];
+    const { scale, stages, bindings } = this.#last;
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
-    return probe(this.#device, { plan, splats, order: order[0] }, drawn);
+    return probe(this.#device, { stages, bindings }, drawn);
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to the caller that uploaded them. */

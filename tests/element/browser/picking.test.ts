@@ -56,7 +56,6 @@ describe('positionFromPoint', () => {
     for (const ball of balls) {
       const point = await element.positionFromPoint(...pageOf(element, ball));
       assert(point, `nothing at ${ball.join()}`);
-      // The depth is that of a splat's centre, to 11 bits.
       [point.x, point.y, point.z].forEach((value, axis) =>
         near(value, ball[axis], 0.02, `${ball.join()} axis ${axis}`),
       );
@@ -64,6 +63,35 @@ describe('positionFromPoint', () => {
     assertEqual(await element.positionFromPoint(3, 3), null, 'beside the scene');
     assertEqual(await element.positionFromPoint(-50, 900), null, 'beside the element');
   });
+
+  for (const renderer of ['webgpu', 'webgl'])
+    it(`${renderer}: picks on a floor of wide splats are on the floor, with their uncertainty`, async () => {
+      document.body.style.margin = '0';
+      const splats = Array.from({ length: 100 * 100 }, (_, i) => [
+        (i % 100) / 12.5 - 4,
+        Math.floor(i / 100) / 12.5 - 4,
+      ]);
+      const bytes = new DataView(new ArrayBuffer(32 * splats.length));
+      splats.forEach(([x, z], i) => {
+        [x, 0, z, 0.1, 0.002, 0.1].forEach((value, k) => bytes.setFloat32(32 * i + 4 * k, value, true));
+        [200, 120, 40, 230, 255, 128, 128, 128].forEach((value, k) => bytes.setUint8(32 * i + 24 + k, value));
+      });
+      const src = `${URL.createObjectURL(new Blob([bytes.buffer]))}#floor.splat`;
+      // Eyes 1.6 m above the floor, which they look at 4 m ahead.
+      const camera = { 'camera-orbit': '0deg 68.2deg 4.308m', 'camera-target': '0m 0m 0m', 'field-of-view': '45deg' };
+      const element = await showLoaded({ src, renderer, ...camera, ...STILL }, 'width: 240px; height: 180px');
+      await atRest(element);
+      const errors: number[] = [];
+      for (let i = 0; i < 30; i++) {
+        const point = await element.positionFromPoint(20 + 40 * (i % 6), 80 + 18 * Math.floor(i / 6));
+        assert(point, `nothing at point ${i}`);
+        assert(point.uncertainty < 0.5, `uncertainty ${point.uncertainty} of point ${i}`);
+        // On the ray the error is larger than in height.
+        errors.push(Math.abs(point.y) * (Math.hypot(point.x, point.z - 4, 1.6) / 1.6));
+      }
+      errors.sort((a, b) => a - b);
+      assert(errors[15] < 0.01 && errors[28] < 0.02, `median ${errors[15]} m, 95 % ${errors[28]} m`);
+    });
 
   it('finds it as well in an element with a border that transforms have scaled', async () => {
     const element = await compass();

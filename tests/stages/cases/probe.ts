@@ -63,17 +63,27 @@ function alphaAt(splat: Splat, { x, y }: Point): number {
   return alpha < ALPHA_MIN ? 0 : alpha;
 }
 
-/** [opacity, median depth or 0, transmittance in front of the point, how near the crossing is to a tie] */
-function twin(nearToFar: readonly Splat[], point: Point): [number, number, number, number] {
-  let [light, inFront, median, margin] = [1, 1, 0, Infinity];
+/** Shares of the light that are left behind the three depths of an answer. */
+const LEFT = [0.9, 0.5, 0.1];
+
+/** Opacity, depths or 0, transmittance in front of the point, and how near the light comes to each of the three shares. */
+function twin(
+  nearToFar: readonly Splat[],
+  point: Point,
+): { opacity: number; depths: number[]; inFront: number; margins: number[] } {
+  let [light, inFront] = [1, 1];
+  const depths = LEFT.map(() => 0);
+  const margins = LEFT.map(() => Infinity);
   for (const splat of nearToFar) {
     const share = 1 - alphaAt(splat, point);
     light *= share;
     if (splat.depth < point.depth) inFront *= share;
-    if (share < 1) margin = Math.min(margin, Math.abs(light - 0.5));
-    if (median === 0 && light < 0.5) median = splat.depth;
+    LEFT.forEach((left, k) => {
+      if (share < 1) margins[k] = Math.min(margins[k], Math.abs(light - left));
+      if (depths[k] === 0 && light < left) depths[k] = splat.depth;
+    });
   }
-  return [1 - light, median, inFront, margin];
+  return { opacity: 1 - light, depths, inFront, margins };
 }
 
 async function checkProbe(bench: Bench, count: number, maxOpacity: number): Promise<void> {
@@ -101,13 +111,15 @@ async function checkProbe(bench: Bench, count: number, maxOpacity: number): Prom
   const found = new Float32Array((await bench.read(answers)).buffer);
   const nearToFar = Array.from(order, (slot) => splats[slot]);
   points.forEach((point, i) => {
-    const [opacity, median, inFront, margin] = twin(nearToFar, point);
+    const { opacity, depths, inFront, margins } = twin(nearToFar, point);
     const near = (actual: number, expected: number, what: string): void =>
       check(Math.abs(actual - expected) < 1e-5, `${what} of point ${i}: ${actual}, expected ${expected}`);
-    near(found[4 * i], opacity, 'opacity');
-    // Where the light falls to a hair of one half, float32 may name the splat next to it.
-    if (margin > 1e-5) near(found[4 * i + 1], median, 'median depth');
-    near(found[4 * i + 2], inFront, 'transmittance in front');
+    near(found[8 * i + 3], opacity, 'opacity');
+    // If the light comes within a rounding of a share, float32 may name the next splat.
+    depths.forEach((depth, k) => {
+      if (margins[k] > 1e-5) near(found[8 * i + k], depth, `depth at ${LEFT[k]}`);
+    });
+    near(found[8 * i + 7], inFront, 'transmittance in front');
   });
 }
 

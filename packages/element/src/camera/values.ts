@@ -42,14 +42,20 @@ export class CameraTarget {
 
 /** A point of the scene: metres in viewer space (y up, right-handed). */
 export class ScenePoint {
-  constructor(x: number, y: number, z: number) {
+  constructor(x: number, y: number, z: number, uncertainty = Infinity) {
     this.x = x;
     this.y = y;
     this.z = z;
+    this.uncertainty = uncertainty;
   }
   readonly x: number;
   readonly y: number;
   readonly z: number;
+  /**
+   * Half of the distance along the line of sight over which the light goes from 90 % to 10 %, in units of viewer space: small on a solid surface, large at edges
+   * and in haze. Infinity if more than 10 % pass.
+   */
+  readonly uncertainty: number;
 
   /** A value for `data-position` of a hotspot, and for `camera-target`. */
   toString(): string {

@@ -94,7 +94,8 @@ export class MeshLayer {
       const mesh = near / stored[i];
       const { depth: asked } = points[i];
       if (asked !== undefined) return mesh < asked ? { ...answer, transmittance: 0 } : answer;
-      return mesh < (answer.depth ?? Infinity) ? { ...answer, depth: mesh, transmittance: 0 } : answer;
+      if (mesh >= (answer.depth ?? Infinity)) return { ...answer, far: Math.min(answer.far ?? mesh, mesh) };
+      return { ...answer, near: Math.min(answer.near ?? mesh, mesh), depth: mesh, far: mesh, transmittance: 0 };
     });
   }
 

@@ -18,6 +18,8 @@ export interface GlProbeSource {
   readonly textures: readonly WebGLTexture[];
   /** Splats in the order. */
   readonly count: number;
+  /** Binds what finds surfaces, with a texture of questions: see shaders/webgl/probe_surface.wgsl. */
+  useSurface(asked: WebGLTexture): void;
 }
 
 /** The ranks that are looked at for a point, from one on to before another. */
@@ -25,6 +27,9 @@ interface Range {
   readonly first: number;
   readonly end: number;
 }
+
+/** Shares of the light that are left behind the near, the middle and the far depth of an answer. */
+const LEFT = [0.9, 0.5, 0.1] as const;
 
 /** Waits for the GPU, so that all passes see the same frame: for clicks and labels, not for every frame. */
 export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]): ProbeAnswer[] {
@@ -36,21 +41,27 @@ export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]
   const { count } = source;
   const whole = points.map((): Range => ({ first: 0, end: count }));
   const rows = lookAt(source, points, whole);
-  const sums = rows.map((row) => ({ light: product(row, 0), inFront: product(row, 1) }));
-  const depths = depthsAt(source, points, whole, rows);
-  return sums.map(({ light, inFront }, i) => ({ opacity: 1 - light, depth: depths[i], transmittance: inFront }));
+  const ranks = LEFT.map((share) => ranksAt(source, points, whole, rows, share));
+  const [near, depth, far] = surfacesOf(source, points, ranks);
+  return rows.map((row, i) => ({
+    opacity: 1 - product(row, 0),
+    transmittance: product(row, 1),
+    ...{ near: near[i], depth: depth[i], far: far[i] },
+  }));
 }
 
-/** Depths of the splats behind which less than half of the light is left: the runs that hold them are looked at again, until each is one splat. */
-function depthsAt(
+/** Ranks of the splats behind which less than a share of the light is left: the runs that hold them are looked at again, until each is one splat. */
+function ranksAt(
   source: GlProbeSource,
   points: readonly ProbePoint[],
   ranges: readonly Range[],
   rows: readonly Float32Array[],
+  share: number,
 ): (number | null)[] {
   let [current, found] = [ranges, rows];
   const before = points.map(() => 1);
-  const crossings = points.map((_, i) => crossing(rows[i], 1));
+  const crossings = points.map((_, i) => crossing(rows[i], 1, share));
+  if (crossings.every((place) => place === null)) return points.map(() => null);
   while (current.some(({ first, end }) => runOf(first, end) > 1)) {
     current = current.map(({ first, end }, i) => {
       const run = runOf(first, end);
@@ -59,9 +70,43 @@ function depthsAt(
       return { first: first + at * run, end: Math.min(end, first + (at + 1) * run) };
     });
     found = lookAt(source, points, current);
-    current.forEach((_, i) => (crossings[i] &&= crossing(found[i], before[i])));
+    current.forEach((_, i) => (crossings[i] &&= crossing(found[i], before[i], share)));
   }
-  return crossings.map((place, i) => (place === null ? null : found[i][NUMBERS * place.at + 2]));
+  return crossings.map((place, i) => (place === null ? null : current[i].first + place.at));
+}
+
+/** Depths at which splats are densest along the rays of the points; one fragment each. */
+function surfacesOf(
+  { gl, useSurface }: GlProbeSource,
+  points: readonly ProbePoint[],
+  ranks: readonly (readonly (number | null)[])[],
+): (number | null)[][] {
+  const width = points.length * ranks.length;
+  const words = new Uint32Array(4 * width);
+  const numbers = new Float32Array(words.buffer);
+  ranks.forEach((row, k) =>
+    points.forEach(({ x, y }, i) => {
+      const at = 4 * (k * points.length + i);
+      numbers.set([x, y], at);
+      words[at + 2] = row[i] ?? 0;
+    }),
+  );
+  const asked = makeTexture(gl, gl.RGBA32UI, [width, 1]);
+  gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+  const texture = makeTexture(gl, gl.RGBA32UI, [width, 1]);
+  const target = makeTarget(gl, [texture]);
+  try {
+    gl.disable(gl.BLEND);
+    useSurface(asked);
+    gl.viewport(0, 0, width, 1);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.readPixels(0, 0, width, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    return ranks.map((row, k) => row.map((rank, i) => (rank === null ? null : numbers[4 * (k * points.length + i)])));
+  } finally {
+    gl.deleteFramebuffer(target);
+    gl.deleteTexture(texture);
+    gl.deleteTexture(asked);
+  }
 }
 
 const runOf = (first: number, end: number): number => Math.max(1, Math.ceil((end - first) / RUNS));
@@ -72,18 +117,18 @@ function product(row: Float32Array, number: number): number {
   return result;
 }
 
-/** The first run behind which less than half of the light is left, and the light that comes to it. */
-function crossing(row: Float32Array, before: number): { at: number; light: number } | null {
+/** The first run behind which less than a share of the light is left, and the light that comes to it. */
+function crossing(row: Float32Array, before: number, share: number): { at: number; light: number } | null {
   let light = before;
   for (let at = 0; at < RUNS; at++) {
     const after = light * row[NUMBERS * at];
-    if (after < 0.5) return { at, light };
+    if (after < share) return { at, light };
     light = after;
   }
   return null;
 }
 
-/** Of each point a row of runs: light that each lets through, light that its splats in front let through, the depth of its last splat. */
+/** Of each point a row of runs: light that each lets through, and light that its splats in front of the point let through. */
 function lookAt(
   { gl, program, textures }: GlProbeSource,
   points: readonly ProbePoint[],

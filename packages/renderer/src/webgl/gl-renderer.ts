@@ -1,6 +1,7 @@
 import { SPLAT_FILTERS, validateCamera, type Camera, type ShDegree, type SplatFilter } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { constants, layouts } from '../generated/shaders.js';
+import type { StructValues } from '../gpu/struct.js';
 import { SH_PRECISION } from '../pack/sh.js';
 import type { Rgba } from '../frame-target.js';
 import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
@@ -12,6 +13,7 @@ import {
   composeFragment,
   DATA_WIDTH,
   probeFragment,
+  probeSurfaceFragment,
   ProbeView,
   projectFragment,
   quadsFragment,
@@ -27,6 +29,7 @@ const TRANSPARENT: Rgba = [0, 0, 0, 0];
 /** A corner of a box that has everything in it. */
 const EVERYWHERE = [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32];
 const SPLAT_TEXTURES = ['shapes', 'paints', 'order'];
+const SURFACE_TEXTURES = ['geometry', 'order', 'asked'];
 
 /** Formats that splats are blended in: `rgba8unorm` where the browser blends no floats. */
 export type GlAccumulationFormat = AccumulationFormat | 'rgba8unorm';
@@ -74,6 +77,9 @@ export class GlRenderer {
   readonly #quads: GlProgram<typeof QuadsView>;
   readonly #compose: GlProgram<typeof layouts.Compose>;
   #probe: GlProgram<typeof ProbeView> | undefined;
+  #surface: GlProgram<typeof layouts.View> | undefined;
+  /** What the splats were projected with. */
+  #view: StructValues<typeof layouts.View> | undefined;
   readonly #corners: WebGLVertexArrayObject;
   readonly #indices: WebGLBuffer;
   readonly #shapes: WebGLTexture;
@@ -159,7 +165,11 @@ export class GlRenderer {
   probe(points: readonly ProbePoint[]): ProbeAnswer[] {
     const gl = this.#gl;
     this.#probe ??= new GlProgram(gl, [fullScreenVertex, probeFragment], ProbeView, SPLAT_TEXTURES);
-    return probeSplats({ gl, program: this.#probe, textures: this.#splatTextures, count: this.#count }, points);
+    this.#surface ??= new GlProgram(gl, [fullScreenVertex, probeSurfaceFragment], layouts.View, SURFACE_TEXTURES);
+    const useSurface = (asked: WebGLTexture): void =>
+      this.#surface!.use(this.#view!, [this.#gaussians.geometry, this.#order, asked]);
+    const source = { gl, program: this.#probe, textures: this.#splatTextures, count: this.#count, useSurface };
+    return this.#view ? probeSplats(source, points) : [];
   }
 
   /** Counts the splats that the last frame drew. Reads all of them back: for panels, not for every frame. */
@@ -179,7 +189,7 @@ export class GlRenderer {
   /** Frees the GPU memory, but for that of the Gaussians. */
   destroy(): void {
     const gl = this.#gl;
-    for (const program of [this.#project, this.#quads, this.#compose, this.#probe]) program?.destroy();
+    for (const program of [this.#project, this.#quads, this.#compose, this.#probe, this.#surface]) program?.destroy();
     for (const texture of [...this.#splatTextures, this.#accumulation?.texture]) gl.deleteTexture(texture ?? null);
     for (const target of [this.#splats, this.#accumulation?.target]) gl.deleteFramebuffer(target ?? null);
     gl.deleteVertexArray(this.#corners);
@@ -209,6 +219,7 @@ export class GlRenderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
     gl.viewport(0, 0, DATA_WIDTH, rowsOf(facts.count));
     gl.disable(gl.BLEND);
+    this.#view = values;
     this.#project.use(values, [geometry, sh]);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }

@@ -1,0 +1,27 @@
+// The depths that `probe_depth` has found, of splats' centers, become those at which the splats are densest along the rays of the points: the surface that a
+// person sees. One page of Gaussians at a time, whose survivors are listed again: the sort has overwritten the list.
+#import shared/densest
+#import shared/stored_gaussian
+#import shared/plan
+#import shared/group
+#import shared/probe
+#import shared/probe_answer
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
+@group(0) @binding(2) var<storage, read> survivors: array<u32>;
+@group(0) @binding(3) var<storage, read> plan: Plan;
+@group(0) @binding(4) var<storage, read> points: array<ProbePoint>;
+@group(0) @binding(5) var<storage, read_write> answers: array<ProbeAnswer>;
+
+@compute @workgroup_size(PROBE_LEVELS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) level: u32) {
+  let at = workgroup_id.x;
+  let page = plan.pages[view.page];
+  let slot = answers[at].slots[level];
+  let is_here = slot >= page.first_slot && slot < page.first_slot + page.survivors;
+  if (!is_here || answers[at].depths[level] == 0.0) { return; }
+  let g = unpack_gaussian(gaussian_at(survivors[slot] - view.first_group * CULL_GROUP));
+  let depth = surface_depth(view, g, points[at].pixel);
+  if (depth > 0.0) { answers[at].depths[level] = depth; }
+}
