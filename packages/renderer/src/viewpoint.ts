@@ -2,6 +2,7 @@ import { loadModule, validateCamera, type Camera } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
 import { makeStages, type Stages } from './bindings.js';
 import type { ProbeAnswer, ProbePoint, ProbeSource } from './depth-probe.js';
+import type { Scratch } from './scratch.js';
 import { recordProjection } from './frame.js';
 import { FrameResources, type Resources } from './frame-resources.js';
 import type { PageRequests } from './gaussian-scene.js';
