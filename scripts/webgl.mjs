@@ -30,7 +30,7 @@ const server = await serve({
   '/cdn': join(root, 'packages/element/cdn'),
   '/packages': join(root, 'packages'),
   '/node_modules': join(root, 'node_modules'),
-  '/firefox': join(root, 'scripts/firefox'),
+  '/engines': join(root, 'scripts/engines'),
   '/fixtures': join(root, 'tests/element/browser/fixtures'),
   '/generators': join(root, 'tests/fixtures/generators'),
   ...(hasSharedData ? { '/shared': join(root, '../shared/data') } : {}),
@@ -96,7 +96,7 @@ async function inChromium(body) {
   const browser = await chromium.launch({ executablePath: findChromium(), args: SWIFTSHADER_FLAGS });
   try {
     const page = await browser.newPage();
-    await page.goto(`${origin}/firefox/webgl.html`);
+    await page.goto(`${origin}/engines/webgl.html`);
     await page.waitForFunction('window.isReady');
     await body((expression) => page.evaluate(expression), browser.version());
   } finally {
@@ -109,7 +109,7 @@ async function inFirefox(body, env) {
   const firefox = await launchFirefox({ executable: values.firefox, env, isHeadless: false });
   try {
     const tab = new FirefoxTab(firefox, origin);
-    await tab.open('/firefox/webgl.html');
+    await tab.open('/engines/webgl.html');
     await tab.evaluate(`until(() => window.isReady, 'the page')`);
     await body((expression) => tab.evaluate(expression), firefox.version);
     const thrown = tab.takeExceptions();

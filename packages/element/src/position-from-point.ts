@@ -1,5 +1,6 @@
 import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import { boxPoints } from './camera/box-points.js';
 import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
 import { ScenePoint } from './camera/values.js';
@@ -14,7 +15,8 @@ export interface QueryHost {
   readonly view: Pick<ViewController, 'painter'>;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   readonly drawnFrom: Camera | undefined;
-  readonly element: HTMLElement;
+  /** What the frame covers, once it is rendered. */
+  readonly surface: HTMLElement | null;
 }
 
 /**
@@ -23,15 +25,11 @@ export interface QueryHost {
  * @returns null beside the scene, where it is more transparent than not, or if the frame is gone meanwhile.
  */
 export async function positionFromPoint(host: QueryHost, clientX: number, clientY: number): Promise<ScenePoint | null> {
-  const { camera, view, drawnFrom: drawn, element } = host;
+  const { camera, view, drawnFrom: drawn, surface } = host;
   const { painter } = view;
-  const { left, top, width, height } = element.getBoundingClientRect();
-  if (drawn === undefined || painter === null || element.clientWidth === 0) return null;
-  // The page's pixels are the element's own, scaled by transforms and zooms around it.
-  const ownX = ((clientX - left) * element.offsetWidth) / width;
-  const ownY = ((clientY - top) * element.offsetHeight) / height;
-  const x = ((ownX - element.clientLeft) * drawn.width) / element.clientWidth;
-  const y = ((ownY - element.clientTop) * drawn.height) / element.clientHeight;
+  if (drawn === undefined || painter === null || surface === null) return null;
+  const share = boxPoints(surface)(clientX, clientY);
+  const [x, y] = [share.x * drawn.width, share.y * drawn.height];
   if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
   try {
     const [answer] = await host.probe([{ x, y }]);

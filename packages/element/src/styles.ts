@@ -42,10 +42,6 @@ export const styles = css`
   .interactive:active {
     cursor: grabbing;
   }
-  .interactive ~ #hotspots {
-    user-select: none;
-    -webkit-user-select: none;
-  }
   canvas {
     display: block;
     width: 100%;
@@ -103,7 +99,7 @@ export const styles = css`
   .hotspot.hidden {
     opacity: var(--min-hotspot-opacity, 0.25);
   }
-  .hotspot.hidden ::slotted(*) {
+  .hotspot.hidden:not(.with-panel) ::slotted(*) {
     pointer-events: none;
   }
   .hotspot.hidden:focus-within {

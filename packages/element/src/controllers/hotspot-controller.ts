@@ -6,6 +6,7 @@ import { toScene } from '../camera/orbit.js';
 import { project } from '../camera/projection.js';
 import { ScenePoint } from '../camera/values.js';
 import type { CameraController } from './camera-controller.js';
+import { labelParts } from './label-parts.js';
 
 export interface HotspotHost {
   readonly camera: Pick<CameraController, 'viewerFrame' | 'bounds'>;
@@ -79,6 +80,8 @@ export class HotspotController implements ReactiveController {
     this.#observer = new MutationObserver(() => this.#collect());
     const attributeFilter = ['slot', 'data-position', 'data-normal', 'data-orbit'];
     this.#observer.observe(this.#host, { childList: true, subtree: true, attributeFilter });
+    // Such events do not bubble.
+    this.#host.addEventListener('toggle', this.#onToggle, true);
     this.#collect();
   }
 
@@ -88,7 +91,11 @@ export class HotspotController implements ReactiveController {
 
   hostDisconnected(): void {
     this.#observer?.disconnect();
+    this.#host.removeEventListener('toggle', this.#onToggle, true);
   }
+
+  /** A panel was opened or closed. */
+  readonly #onToggle = (): void => this.#place();
 
   /** A frame was drawn from this camera. */
   frameDrawn(camera: Camera): void {
@@ -187,6 +194,8 @@ export class HotspotController implements ReactiveController {
     const isOpen = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
     // Of a label whose point has left the frame a part may still be there to read.
     box.classList.toggle('hidden', !isOpen);
+    const holdsPanel = !isOpen && hotspot.elements.some((element) => element.querySelector(labelParts.panel) !== null);
+    box.classList.toggle('with-panel', holdsPanel);
     const isVisible = isOpen && x >= 0 && y >= 0 && x <= this.#host.clientWidth && y <= this.#host.clientHeight;
     hotspot.isVisible = isVisible;
     for (const element of hotspot.elements) {

@@ -1,5 +1,6 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { WheelZoom } from '../attributes.js';
+import { boxMoves } from '../camera/box-points.js';
 import { DoubleTap } from '../camera/double-tap.js';
 import {
   isCameraDrag,
@@ -12,6 +13,7 @@ import {
   type CameraAction,
   type Point,
 } from '../camera/gestures.js';
+import { isWithin, labelParts, scrollsAround } from './label-parts.js';
 
 export { PromptController } from './prompt-controller.js';
 
@@ -53,10 +55,9 @@ interface Pointer extends Point {
   readonly pans: boolean;
   /** Whose its moves are: of one finger, and of what begins on a label, this is known only once it has set out. */
   readonly owner: 'camera' | 'page' | 'undecided';
+  /** From CSS pixels of the page to those of the element, which CSS may have turned. */
+  readonly inBox: (point: Point) => Point;
 }
-
-/** Parts of a label that have their own use for a drag. */
-const DRAGGED = 'input, select, textarea, video, audio, [contenteditable]';
 
 /** Listens to mouse, pen, touch, wheel and keys on the picture and its labels, and turns them into camera actions. */
 export class InputController implements ReactiveController {
@@ -104,6 +105,7 @@ export class InputController implements ReactiveController {
     const { enabled, zoom, wheel, touchAction } = this.#of.input;
     const targets = [this.#surface, layer];
     for (const { style } of targets) style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
+    if (!enabled) setSelectable(layer, true);
     // An element that has left the page is updated once more; the listener of its document would keep it for good.
     if (!enabled || !this.#surface.isConnected) return this.#stop();
     this.#listening ??= this.#listen(this.#surface, targets);
@@ -153,20 +155,29 @@ export class InputController implements ReactiveController {
 
   readonly #onDown = (event: PointerEvent): void => {
     if (event.button !== LEFT_BUTTON && event.button !== RIGHT_BUTTON) return;
+    if (this.#pointers.size === 0) this.#way = 0;
     const isOnLabel = event.currentTarget !== this.#surface;
-    if (isOnLabel && (event.defaultPrevented || (event.target as Element).closest(DRAGGED))) return;
+    if (isOnLabel && !this.#takesFromLabel(event)) return;
     const pans = event.button === RIGHT_BUTTON || event.shiftKey || event.ctrlKey || event.metaKey;
     const isTouch = event.pointerType === 'touch';
     if (isTouch !== this.#isTouch) this.#host.requestUpdate();
     this.#isTouch = isTouch;
-    if (this.#pointers.size === 0) this.#way = 0;
     if (isTouch && !isOnLabel) this.#doubleTap.down(positionOf(event), event.timeStamp, this.#pointers.size === 0);
     const owner = isTouch || isOnLabel ? 'undecided' : 'camera';
     const start = positionOf(event);
-    this.#pointers.set(event.pointerId, { ...start, start, pans, owner });
+    const inBox = boxMoves(this.#surface!, start);
+    this.#pointers.set(event.pointerId, { ...start, start, pans, owner, inBox });
     // A label whose pointer is captured would never hear of its click.
     if (!isOnLabel) this.#capture(event.pointerId);
   };
+
+  /** Whether the camera may have a pointer that comes down on a label: only what it may not have selects text. */
+  #takesFromLabel(event: PointerEvent): boolean {
+    const own = event.button === RIGHT_BUTTON ? labelParts.withMenu : labelParts.dragged;
+    const takes = !event.defaultPrevented && !isWithin(event, own);
+    setSelectable(event.currentTarget as HTMLElement, !takes);
+    return takes;
+  }
 
   /** Keeps a drag going outside of the element. */
   #capture(pointerId: number): void {
@@ -191,10 +202,12 @@ export class InputController implements ReactiveController {
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
     if (!other && from.owner === 'undecided') return this.#decide(event, from, to);
     this.#pointers.set(event.pointerId, { ...from, ...to });
+    const { inBox } = from;
+    const [start, end] = [inBox(from), inBox(to)];
     const actions = other
-      ? this.#ofPair([from, other], [to, other], height)
+      ? this.#ofPair([start, inBox(other)], [end, inBox(other)], height)
       : from.owner === 'camera'
-        ? [from.pans ? panOf(from, to, height) : orbitOf(from, to, height)]
+        ? [from.pans ? panOf(start, end, height) : orbitOf(start, end, height)]
         : [];
     // A carousel around the scene learns so that the drag is not its own. The browser does nothing by itself on a move.
     for (const action of actions) if (this.#perform(action)) event.preventDefault();
@@ -255,23 +268,25 @@ export class InputController implements ReactiveController {
     if (this.#of.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
   };
 
-  #wheelZooms({ ctrlKey, metaKey, target, currentTarget }: WheelEvent): boolean {
+  #wheelZooms(event: WheelEvent): boolean {
     const { wheel } = this.#of.input;
-    if (ctrlKey || metaKey || wheel === 'always') return true;
+    if (isWithin(event, labelParts.panel)) return false;
+    if (event.ctrlKey || event.metaKey || wheel === 'always') return true;
     if (wheel !== 'auto') return false;
     // A label may have a box of its own to scroll.
-    if (currentTarget !== this.#surface && scrollsAround(target as Element, this.#host)) return false;
+    if (event.currentTarget !== this.#surface && scrollsAround(event.target as Element, this.#host)) return false;
     return this.#host.matches(':focus-within') || !scrollsAround(this.#host);
   }
 
-  /** The right button pans, so it opens no menu. */
+  /** The right button pans, so it opens no menu but where a label has something to copy, to save or to follow. */
   readonly #onContextMenu = (event: Event): void => {
-    if (this.#of.input.pan) event.preventDefault();
+    if (this.#of.input.pan && !isWithin(event, labelParts.withMenu)) event.preventDefault();
   };
 
   /** Two fingers move the camera, also where one finger scrolls the page; without zoom they are the page's, whose own zoom some people need. */
   readonly #onTouchMove = (event: TouchEvent): void => {
-    if (event.touches.length > 1 && event.cancelable && this.#of.input.zoom) event.preventDefault();
+    if (event.touches.length < 2 || !event.cancelable || isWithin(event, labelParts.panel)) return;
+    if (this.#of.input.zoom) event.preventDefault();
   };
 
   #ofPair(from: readonly [Point, Point], to: readonly [Point, Point], height: number): readonly CameraAction[] {
@@ -287,20 +302,14 @@ export class InputController implements ReactiveController {
   }
 }
 
-/** Whether there is anything to scroll: a box between a node and another, or, up to the page, the page itself or that of a frame around it. */
-function scrollsAround(node: Element | null, end: Element | null = null): boolean {
-  if (node === end) return end === null && self !== top;
-  const { scrollHeight, clientHeight, ownerDocument, parentElement } = node!;
-  const isBox = node === ownerDocument.scrollingElement || /auto|scroll/.test(getComputedStyle(node!).overflowY);
-  return (scrollHeight > clientHeight && isBox) || scrollsAround(parentElement ?? hostOf(node!), end);
-}
-
-const hostOf = (node: Element): Element | null => (node.getRootNode() as Partial<ShadowRoot>).host ?? null;
-
 /** A CSS touch-action that leaves pinches to the page, too. */
 const withPinch = (touchAction: string): string =>
   ['auto', 'manipulation'].includes(touchAction)
     ? touchAction
     : `${touchAction === 'none' ? '' : touchAction} pinch-zoom`.trim();
+
+const setSelectable = ({ style }: HTMLElement, isSelectable: boolean): void => {
+  style.userSelect = style.webkitUserSelect = isSelectable ? '' : 'none';
+};
 
 const positionOf = (event: PointerEvent): Point => ({ x: event.clientX, y: event.clientY });

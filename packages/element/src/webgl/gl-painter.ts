@@ -30,6 +30,8 @@ export class GlPainter implements Painter {
   #asked: OrderView | undefined;
   /** The first order is there. */
   readonly #ordered: Promise<void>;
+  /** A frame was asked for before there was an order to draw it in. */
+  #isOwed = false;
   /** The first frame is drawn. */
   readonly #shown: Promise<void>;
   #tellShown: () => void = () => undefined;
@@ -48,10 +50,12 @@ export class GlPainter implements Painter {
       positions,
       spawn,
       onOrder: (sorted) => {
-        const isFirst = this.#sorted === undefined;
+        // Who waits for the first order draws it.
+        const isDue = this.#isOwed || this.#sorted !== undefined;
+        this.#isOwed = false;
         this.#setOrder(sorted);
         tellOrdered();
-        if (!isFirst) events.onIncomplete();
+        if (isDue) events.onIncomplete();
       },
     });
   }
@@ -100,15 +104,15 @@ export class GlPainter implements Painter {
         this.#setOrder(this.#sorter.sortNow(view));
       } else this.#ask(view);
     }
-    // The first frame waits for an order.
-    if (this.#sorted === undefined) return;
+    // A scene that was loaded without a size had no first frame, and has no order yet.
+    if (this.#sorted === undefined) return void (this.#isOwed = true);
     if (onTime === undefined) return this.#draw(frame);
     const { resolutionScale = 1 } = frame.levers ?? {};
     const least = SURE_SHARE * this.#wholeMs * resolutionScale ** 2;
     this.#scene.lease.clock
       .time(() => this.#draw(frame), least)
       .then((time) => {
-        if (resolutionScale === 1) this.#wholeMs = Math.min(this.#wholeMs, time.atMost);
+        if (resolutionScale === 1) this.#wholeMs = Math.min(this.#wholeMs || Infinity, time.atMost);
         onTime(time);
       })
       .catch(() => undefined);
@@ -124,7 +128,6 @@ export class GlPainter implements Painter {
     await whenDrawn(this.#scene.lease.gl).catch(() => undefined);
     this.#wholeMs = performance.now() - begin;
     if (!this.isLost && !this.#isDestroyed) this.#show(frame);
-    this.#tellShown();
   }
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
@@ -190,5 +193,6 @@ export class GlPainter implements Painter {
     // WebGL counts rows from below, so that is where a smaller image lies.
     context.globalCompositeOperation = 'copy';
     context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
+    this.#tellShown();
   }
 }

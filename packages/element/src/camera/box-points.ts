@@ -1,0 +1,59 @@
+/** Where points of the page lie in a box that CSS has transformed. */
+import type { Point } from './gestures.js';
+
+/** From a point of the page, in CSS pixels as of a MouseEvent, to shares of a box's width and height from its upper left corner. NaN where the box is seen from the side. */
+export type BoxPoints = (clientX: number, clientY: number) => Point;
+
+/** Corners of a box, in the order of a loop: left and top in percent. */
+const CORNERS = [
+  [0, 0],
+  [100, 0],
+  [100, 100],
+  [0, 100],
+];
+
+/**
+ * Measures a box, whatever `transform`, `perspective` and `zoom` lie between it and the page. Browsers give the bounding rectangle of a transformed box, but the exact
+ * place of one without extent: one is placed in each corner. The formula is that of Heckbert, "Fundamentals of Texture Mapping and Image Warping" (1989), section 2.2.3.
+ * @param box a positioned element
+ */
+export function boxPoints(box: HTMLElement): BoxPoints {
+  const [p, q, r, s] = cornersOf(box);
+  const [ax, ay, bx, by] = [q.x - r.x, q.y - r.y, s.x - r.x, s.y - r.y];
+  const [cx, cy] = [p.x - q.x + r.x - s.x, p.y - q.y + r.y - s.y];
+  const area = ax * by - ay * bx;
+  // What is nearer is larger: the divisor of the projection is 1 + g u + h v.
+  const [g, h] = [(cx * by - cy * bx) / area, (ax * cy - ay * cx) / area];
+  const alongU = { x: q.x - p.x + g * q.x, y: q.y - p.y + g * q.y };
+  const alongV = { x: s.x - p.x + h * s.x, y: s.y - p.y + h * s.y };
+  return (x, y) => {
+    const [ux, uy] = [alongU.x - g * x, alongU.y - g * y];
+    const [vx, vy] = [alongV.x - h * x, alongV.y - h * y];
+    const [dx, dy] = [x - p.x, y - p.y];
+    const determinant = ux * vy - uy * vx;
+    return { x: (dx * vy - dy * vx) / determinant, y: (ux * dy - uy * dx) / determinant };
+  };
+}
+
+/** Moves on the page, near a point of it, as moves in CSS pixels of the box itself. */
+export function boxMoves(box: HTMLElement, { x, y }: Point): (point: Point) => Point {
+  const at = boxPoints(box);
+  const [origin, right, below] = [at(x, y), at(x + 1, y), at(x, y + 1)];
+  const { clientWidth: width, clientHeight: height } = box;
+  const [rightX, rightY] = [width * (right.x - origin.x), height * (right.y - origin.y)];
+  const [belowX, belowY] = [width * (below.x - origin.x), height * (below.y - origin.y)];
+  if (![rightX, rightY, belowX, belowY].every(Number.isFinite)) return (point) => point;
+  return (point) => ({ x: rightX * point.x + belowX * point.y, y: rightY * point.x + belowY * point.y });
+}
+
+function cornersOf(box: HTMLElement): Point[] {
+  const marks = CORNERS.map(([left, top]) => {
+    const mark = box.ownerDocument.createElement('i');
+    mark.style.cssText = `position:absolute;left:${left}%;top:${top}%`;
+    return mark;
+  });
+  box.append(...marks);
+  const corners = marks.map((mark) => mark.getBoundingClientRect());
+  for (const mark of marks) mark.remove();
+  return corners.map(({ x, y }) => ({ x, y }));
+}

@@ -1,0 +1,271 @@
+/** What every engine must do with the built element and the site: the checks of `npm run lab:firefox` and `npm run lab:webkit`. */
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { chromium } from 'playwright-core';
+import { PNG } from 'pngjs';
+import { serve } from '../../packages/cli/src/lib/server.mjs';
+import { findChromium, SWIFTSHADER_FLAGS } from '../lib/chromium.mjs';
+import { root } from '../lib/run.mjs';
+
+/** What pictures on the screen may differ by from Chromium's: both have been rounded to 8 bits twice, by us and by the compositor. */
+const LEAST_DB = 57;
+const SIZE = { width: 300, height: 240 };
+/** Pages of the site that visitors see first, and those of frameworks. */
+const PAGES = ['/', '/gallery/', '/react/', '/vue/'];
+
+let failures = 0;
+
+export function assert(condition, message) {
+  if (!condition) throw new Error(message);
+}
+
+export async function check(name, body) {
+  const start = performance.now();
+  try {
+    const found = await body();
+    console.log(`ok      ${name}${found ? `: ${found}` : ''} (${Math.round(performance.now() - start)} ms)`);
+  } catch (error) {
+    failures++;
+    console.log(`FAILED  ${name}: ${error.message}`);
+  }
+}
+
+/** Serves what the checks open. @param body gets its origin @returns the exit status */
+export async function withSite(body) {
+  const server = await serve({
+    '/': join(root, 'demo/dist'),
+    '/cdn': join(root, 'packages/element/cdn'),
+    '/engines': join(root, 'scripts/engines'),
+    '/fixtures': join(root, 'tests/element/browser/fixtures'),
+    '/generators': join(root, 'tests/fixtures/generators'),
+  });
+  try {
+    await body(`http://localhost:${server.address().port}`);
+  } finally {
+    server.closeAllConnections();
+    server.close();
+  }
+  console.log(failures === 0 ? 'All well.' : `${failures} failed.`);
+  return failures === 0 ? 0 : 1;
+}
+
+/** Scenes on the screen, against Chromium's pictures by the same renderer. @param gaps dB by name, where an engine is known to differ */
+export async function checkScenes(tab, origin, scenes, gaps = {}) {
+  const expected = await picturesOfChromium(origin, scenes);
+  for (const [name, attributes] of Object.entries(scenes)) {
+    await check(`${name}, against Chromium`, async () => {
+      await tab.evaluate(drawing(attributes));
+      const decibels = psnr(await tab.screenshot(SIZE), expected[name]);
+      const least = gaps[name] ?? LEAST_DB;
+      assert(decibels >= least, `${decibels.toFixed(1)} dB, expected at least ${least}`);
+      return `${decibels.toFixed(1)} dB`;
+    });
+  }
+}
+
+/** Labels, poster, roles and what `positionFromPoint()` finds, by one renderer. */
+export async function checkParts(tab, renderer) {
+  const still = {
+    src: '/fixtures/compass.ply',
+    renderer,
+    'camera-orbit': '0deg 90deg 8m',
+    'interaction-prompt': 'none',
+  };
+  const shown = (more = {}) => `await show(${JSON.stringify({ ...still, ...more })})`;
+  const found = async (body) =>
+    JSON.parse(await tab.evaluate(`(async () => JSON.stringify(await (async () => { ${body} })()))()`));
+  await check(`the renderer is ${renderer}`, async () => {
+    const name = await found(`${shown()}; return element.statistics.renderer;`);
+    assert(name === renderer, name);
+  });
+  await check('labels: one in front is visible, one behind is not', async () => {
+    await found(`${shown()};
+      element.innerHTML = '<button slot="hotspot-a" data-position="0 0 1">a</button><button slot="hotspot-b" data-position="0 0 -1">b</button>';
+      await until(() => element.queryHotspot('hotspot-a')?.visible === true, 'the label in front');
+      await until(() => element.queryHotspot('hotspot-b')?.visible === false, 'the label behind');
+      return true;`);
+  });
+  await check('a poster covers the scene until it is dismissed', async () => {
+    const covered =
+      await found(`const coming = show(${JSON.stringify({ ...still, poster: '/scenes/skull-poster.webp', reveal: 'manual', loading: 'eager' })});
+      await coming;
+      const before = [element.revealed, element.shadowRoot.querySelector('[part=poster]').naturalWidth > 0];
+      element.shadowRoot.querySelector('[part=poster-button]').click();
+      await until(() => element.revealed, 'the scene');
+      return [...before, element.loaded];`);
+    assert(covered.join() === 'false,true,true', `revealed, poster, loaded: ${covered}`);
+  });
+  await check('roles and names', async () => {
+    const roles = await found(`${shown({ 'camera-controls': '', alt: 'Compass' })};
+      const view = element.shadowRoot.querySelector('#view');
+      return [view.getAttribute('role'), view.getAttribute('aria-label'), view.tabIndex, element.shadowRoot.querySelector('[role=status]') !== null];`);
+    assert(roles.join() === 'application,Compass,0,true', roles.join());
+  });
+  await check('positionFromPoint(), as it is and turned by CSS', async () => {
+    // Rotated about its middle, the element's right is below.
+    const points = await found(`${shown({ 'camera-orbit': '90deg 90deg 8m' })};
+      const { left, top, width, height } = element.getBoundingClientRect();
+      const upright = await element.positionFromPoint(left + width / 2, top + height / 2);
+      element.style.transform = 'rotate(90deg)';
+      await frames(3);
+      const turned = await element.positionFromPoint(left + width / 2, top + height / 2);
+      return [upright?.x, turned?.x];`);
+    assert(
+      points.every((x) => Math.abs(x - 1) < 0.05),
+      `x ${points.join(', ')}, expected 1`,
+    );
+  });
+  await check('a scene without a size is there when it is shown', async () => {
+    await found(`const coming = show(${JSON.stringify({ ...still, loading: 'eager' })});
+      document.querySelector('gaussian-splat').style.display = 'none';
+      await coming;
+      element.style.display = 'block';
+      await until(() => element.toDataURL().length > 2000, 'the picture');
+      await delay(300);
+      return true;`);
+    assert(paintedShare(await tab.screenshot(SIZE)) > 0.01, 'the screen stays blank');
+  });
+}
+
+/** Mouse, wheel, keys and fingers, as the browser makes them. */
+export async function checkHands(tab, { renderer, hasTouch = true }) {
+  const start = () =>
+    tab.evaluate(
+      `show({ src: '/fixtures/compass.ply', renderer: '${renderer}', 'camera-controls': '', zoom: 'always', 'camera-orbit': '0deg 90deg 8m', 'interaction-prompt': 'none' })
+        .then(() => frames(3))`,
+    );
+  const placed = async () => JSON.parse(await tab.evaluate('place()'));
+  const mouse = (...actions) => tab.perform({ type: 'pointer', id: 'mouse', actions });
+  const move = (x, y) => ({ type: 'pointerMove', x, y });
+  const down = { type: 'pointerDown', button: 0 };
+  const up = { type: 'pointerUp', button: 0 };
+  await check('a drag orbits', async () => {
+    await start();
+    await mouse(move(150, 120), down, move(120, 120), move(90, 120), up);
+    const [theta] = await placed();
+    assert(Math.abs(theta - 90) < 1, `theta ${theta}, expected 90`);
+  });
+  await check('the wheel zooms', async () => {
+    await start();
+    const scroll = { type: 'scroll', x: 150, y: 120, deltaX: 0, deltaY: -120 };
+    await tab.perform({ type: 'wheel', id: 'wheel', actions: [scroll] });
+    const [, , radius] = await placed();
+    assert(radius < 7.5, `radius ${radius}`);
+  });
+  await check('arrow keys turn', async () => {
+    await start();
+    await tab.evaluate('element.focus()');
+    const press = (value) => [
+      { type: 'keyDown', value },
+      { type: 'keyUp', value },
+    ];
+    await tab.perform({ type: 'key', id: 'keys', actions: press('\uE014') });
+    const [theta] = await placed();
+    assert(Math.abs(theta - 22.5) < 1e-6, `theta ${theta}, expected 22.5`);
+  });
+  if (!hasTouch) return;
+  await check('a finger drags, and a double tap picks', async () => {
+    await start();
+    const touch = (...actions) =>
+      tab.perform({ type: 'pointer', id: 'finger', parameters: { pointerType: 'touch' }, actions });
+    await touch(move(150, 120), down, move(140, 120), move(110, 120), up);
+    const [theta] = await placed();
+    assert(Math.abs(theta - 45) < 1, `theta ${theta} after a drag, expected 45`);
+    await start();
+    const [x, y] = JSON.parse(
+      await tab.evaluate(`(async () => {
+        for (let x = 155; x < 300; x += 5) {
+          const point = await element.positionFromPoint(x, 120);
+          if (point && point.x > 0.9) return JSON.stringify([x, 120]);
+        }
+        throw new Error('no ball on the right');
+      })()`),
+    );
+    const pause = { type: 'pause', duration: 60 };
+    await touch(move(x, y), down, pause, up, pause, down, pause, up);
+    await tab.evaluate(`until(() => element.getCameraTarget().x > 0.9, 'the target')`);
+  });
+}
+
+/** A lost WebGL context comes back with the same picture. */
+export async function checkLostContext(tab) {
+  await check('a lost context: back with the same picture', async () => {
+    const told = await tab.evaluate(`(async () => {
+      await show({ src: '/fixtures/compass.ply', renderer: 'webgl' });
+      await delay(500);
+      const before = element.toDataURL();
+      contexts.at(-1).getExtension('WEBGL_lose_context').loseContext();
+      await until(() => told.includes('contextrestored'), 'the scene');
+      return [told.join(), before === element.toDataURL()].join();
+    })()`);
+    assert(told === 'contextlost,contextrestored,true', told);
+  });
+}
+
+/** Pages of the site: every scene that can be seen comes, and paints. Pictures of the pages are left in `.cache/engines` to be looked at. */
+export async function checkPages(tab, engine) {
+  const folder = join(root, '.cache/engines', engine);
+  mkdirSync(folder, { recursive: true });
+  for (const page of PAGES)
+    await check(`the page ${page}`, async () => {
+      await tab.open(page);
+      await tab.evaluate(`import('/engines/page.js')`);
+      const told = await tab.evaluate('scenesOfPage()');
+      const picture = await tab.screenshot({ width: 1000, height: 700 });
+      writeFileSync(join(folder, `${page.replaceAll('/', '') || 'home'}.png`), picture);
+      assert(/^\d+ scenes/.test(told) && !told.startsWith('0'), told);
+      return told;
+    });
+}
+
+export async function checkThrown(tab) {
+  await check('nothing was thrown', async () => {
+    const thrown = await tab.takeExceptions();
+    assert(thrown.length === 0, thrown.join('; '));
+  });
+}
+
+/** An expression that shows a scene, and waits a while for what comes after it. */
+function drawing(attributes) {
+  const rest = attributes.postprocess || attributes.detail ? 6000 : 1500;
+  return `show(${JSON.stringify({ ...attributes, loading: 'eager' })}).then(() => delay(${rest}))`;
+}
+
+async function picturesOfChromium(origin, scenes) {
+  const browser = await chromium.launch({ executablePath: findChromium(), args: SWIFTSHADER_FLAGS });
+  try {
+    const page = await browser.newPage();
+    await page.goto(`${origin}/engines/page.html`);
+    const pictures = {};
+    for (const [name, attributes] of Object.entries(scenes)) {
+      await page.evaluate(drawing(attributes));
+      pictures[name] = await page.screenshot({ clip: { x: 0, y: 0, ...SIZE } });
+    }
+    return pictures;
+  } finally {
+    await browser.close();
+  }
+}
+
+/** The upper left corner of a picture, as red, green and blue. */
+function cornerOf(bytes) {
+  const { width, data } = PNG.sync.read(bytes);
+  const colors = new Uint8Array(3 * SIZE.width * SIZE.height);
+  for (let y = 0, to = 0; y < SIZE.height; y++)
+    for (let x = 0; x < SIZE.width; x++) for (let c = 0; c < 3; c++) colors[to++] = data[4 * (y * width + x) + c];
+  return colors;
+}
+
+/** Share of the values that are other than white. */
+const paintedShare = (bytes) => {
+  const colors = cornerOf(bytes);
+  return colors.reduce((sum, value) => sum + (value < 200 ? 1 : 0), 0) / colors.length;
+};
+
+/** Of two PNG, over their colours; pictures that show nothing are refused. */
+function psnr(a, b) {
+  const [found, expected] = [a, b].map(cornerOf);
+  assert(paintedShare(b) > 500 / expected.length, 'an empty picture');
+  const sum = found.reduce((total, value, i) => total + (value - expected[i]) ** 2, 0);
+  return sum === 0 ? Infinity : 10 * Math.log10((255 ** 2 * found.length) / sum);
+}
