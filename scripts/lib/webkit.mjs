@@ -100,7 +100,8 @@ export class WebKitTab {
 
   async perform(source) {
     await this.#webkit.send('POST', '/actions', { actions: [source] });
-    await this.#webkit.send('DELETE', '/actions');
+    // The driver would turn a wheel back.
+    if (source.type !== 'wheel') await this.#webkit.send('DELETE', '/actions');
   }
 
   /** What the pages themselves have recorded (`window.thrown`): WebDriver tells of nothing. */

@@ -94,7 +94,7 @@ describe('panels and links in labels', () => {
   };
   const thetaOf = (element: GaussianSplatElement): number => element.getCameraOrbit().theta;
 
-  afterEach(resetMouse);
+  afterEach(() => resetMouse());
 
   it('a drag over the text of a panel selects it, the wheel scrolls it, and the scene stays', async () => {
     const element = await withLabels();
