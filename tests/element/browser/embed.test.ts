@@ -2,6 +2,7 @@
 import { emulateMedia } from '@web/test-runner-commands';
 import { violations } from './support/axe.js';
 import { assert, assertEqual, COMPASS, nextEvent, until } from './support/harness.js';
+import { comesToShow } from './support/screen.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
@@ -92,5 +93,18 @@ describe('embed.html', () => {
     const poster = await open(String(new URLSearchParams({ src: COMPASS, poster: refused[0] })));
     assert(/^poster: expected/.test(poster.querySelector('p')!.textContent), 'a poster');
     assert(/^src: expected the address/.test((await open('')).querySelector('p')!.textContent), 'no address');
+  });
+
+  it('says what its server must send where a sandbox takes its origin away', async () => {
+    const frame = document.createElement('iframe');
+    frame.setAttribute('sandbox', 'allow-scripts');
+    frame.src = `/packages/element/cdn/embed.html?src=${COMPASS}`;
+    frame.style.cssText = 'width: 300px; height: 200px; border: 0';
+    document.body.append(frame);
+    // Nobody can look into it but on the screen.
+    assert(
+      await comesToShow(frame, (screen) => screen.middleOf(([red]) => red < 100) !== null),
+      'the frame stays blank',
+    );
   });
 });
