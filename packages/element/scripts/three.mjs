@@ -13,6 +13,7 @@ export {
   WebGPUCoordinateSystem,
   WebGPURenderer,
 } from 'three/webgpu';
+export { neutralToneMapping, output, sRGBTransferOETF, vec4 } from 'three/tsl';
 export { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 export { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
 

@@ -76,6 +76,37 @@ describe('meshes', () => {
     assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METRE, 50)), 'turned to its edge');
   });
 
+  it('without light keep their base colors, and lit by even light nearly so', async () => {
+    const greys = [0, 0.02, 0.1, 0.214, 0.5, 1];
+    const shown = [0, 39, 89, 127, 188, 255];
+    const element = place();
+    const boxes = greys.flatMap((grey, i) =>
+      (['unlit', 'rough'] as const).map((surface, row) =>
+        mesh({ surface, colour: [grey, grey, grey], half: [0.4, 0.4, 0.05] }, { position: `${i - 2.5} ${row} 0` }),
+      ),
+    );
+    const orange = mesh({ surface: 'unlit', colour: [1, 0.2122, 0], half: [0.4, 0.4, 0.05] }, { position: '0 -2 0' });
+    element.append(...boxes, orange);
+    await until(() => [...boxes, orange].every(({ loaded }) => loaded), 'all boxes');
+    await frames();
+    const screen = await screenOf(element);
+    const at = (x: number, y: number): Rgb => screen.at(60 + x * METRE, 50 - y * METRE);
+    const unlit = greys.map((_, i) => at(i - 2.5, 0));
+    for (const [i, found] of unlit.entries())
+      assert(
+        found.every((value) => Math.abs(value - shown[i]) <= 1),
+        `grey ${shown[i]}: ${found.join()}`,
+      );
+    const found = at(0, -2);
+    assert(
+      [255, 127, 0].every((value, k) => Math.abs(value - found[k]) <= 1),
+      `orange: ${found.join()}`,
+    );
+    const lit = greys.map((_, i) => at(i - 2.5, 1)[0]);
+    const most = Math.max(...lit.map((value, i) => Math.abs(value - shown[i])));
+    assert(most <= 24, `lit greys ${lit.join()} for ${shown.join()}`);
+  });
+
   itInLab('are in pictures of toBlob(), over a colour and over nothing, and hide splats there', async () => {
     const element = place({ src: GREEN });
     element.append(mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' }));

@@ -19,6 +19,7 @@ import { matrixOfFrame, transposed } from '../composition/placing.js';
 import type { PlacedModel } from './meshes.js';
 import type { Model } from './model.js';
 import { MeshResolve } from './mesh-resolve.js';
+import { light, showAsDisplayed } from './shown-colors.js';
 
 /** Samples of a pixel. */
 const SAMPLES = 4;
@@ -140,9 +141,10 @@ export class MeshLayer {
   #show(model: Model): void {
     this.#shown.set(model, model.root);
     this.#scene.add(model.root);
+    model.materials.forEach(showAsDisplayed);
     if (model.hasLights) return;
     const { texture } = (this.#environment ??= this.#makeEnvironment());
-    for (const material of model.materials) if ('envMap' in material) material.envMap = texture;
+    for (const material of model.materials) light(material, texture);
   }
 
   /** Even light from all around: the room of model-viewer. */

@@ -1,4 +1,4 @@
-/** From what three.js has drawn, in linear light and with several samples a pixel, to the frame and one depth a pixel. */
+/** From what three.js has drawn, with several samples a pixel, to the frame and one depth a pixel. */
 import type { Rgba } from '@gaussian-splat/renderer';
 
 /** Premultiplied colours over what is there. */
@@ -18,29 +18,10 @@ fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
   return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// Khronos' PBR Neutral: base colours stay, highlights are compressed.
-fn tone_mapped(linear: vec3f) -> vec3f {
-  let least = min(linear.r, min(linear.g, linear.b));
-  let color = linear - select(0.04, least - 6.25 * least * least, least < 0.08);
-  let peak = max(color.r, max(color.g, color.b));
-  if (peak < 0.76) { return color; }
-  let compressed = 1.0 - 0.0576 / (peak + 0.24 - 0.76);
-  let share = 1.0 / (0.15 * (peak - compressed) + 1.0);
-  return mix(vec3f(compressed), color * compressed / peak, share);
-}
-
-fn encoded(linear: vec3f) -> vec3f {
-  let high = 1.055 * pow(linear, vec3f(1.0 / 2.4)) - 0.055;
-  return select(high, 12.92 * linear, linear <= vec3f(0.0031308));
-}
-
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> Resolved {
   let pixel = vec2u(position.xy);
-  let color = textureLoad(drawn, pixel, 0);
-  let opaque = clamp(color.rgb / max(color.a, 1e-4), vec3f(0.0), vec3f(1e4));
-  let shown = clamp(encoded(tone_mapped(opaque)), vec3f(0.0), vec3f(1.0));
-  return Resolved(vec4f(shown * color.a, color.a), textureLoad(depths, pixel, 0));
+  return Resolved(textureLoad(drawn, pixel, 0), textureLoad(depths, pixel, 0));
 }
 `;
 

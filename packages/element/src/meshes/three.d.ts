@@ -54,8 +54,25 @@ export class RenderTarget {
   setSize(width: number, height: number): void;
   dispose(): void;
 }
+/** A value of a shader. */
+export interface ShaderNode {
+  readonly rgb: ShaderNode;
+  readonly a: ShaderNode;
+  clamp(low: number, high: number): ShaderNode;
+}
+/** What a material has computed: linear light, and alpha. */
+export const output: ShaderNode;
+export function neutralToneMapping(color: ShaderNode, exposure: number): ShaderNode;
+export function sRGBTransferOETF(color: ShaderNode): ShaderNode;
+export function vec4(rgb: ShaderNode, a: ShaderNode): ShaderNode;
+
 export class Material {
+  /** Of glTF's `KHR_materials_unlit`. */
+  readonly isMeshBasicMaterial?: true;
   envMap?: Texture | null;
+  envMapIntensity?: number;
+  /** What is written in place of {@link output}. */
+  outputNode?: ShaderNode;
   dispose(): void;
 }
 export interface Attribute {

@@ -30,6 +30,8 @@ export interface BoxOptions {
   readonly half?: readonly [number, number, number];
   /** Linear red, green, blue; it shines by itself, so that no light changes it. */
   readonly colour?: readonly [number, number, number];
+  /** How its color is meant: it shines (the default), is its base color whatever light there is, or reflects light as a rough surface does. */
+  readonly surface?: 'shining' | 'unlit' | 'rough';
   /** It moves by so much along x within a second. */
   readonly moves?: number;
   /** A splat besides, at this place. */
@@ -37,7 +39,13 @@ export interface BoxOptions {
 }
 
 /** A box that shines. */
-export function boxGlb({ half = [0.5, 0.5, 0.5], colour = [1, 0, 0], moves, splat }: BoxOptions = {}): File {
+export function boxGlb({
+  half = [0.5, 0.5, 0.5],
+  colour = [1, 0, 0],
+  surface = 'shining',
+  moves,
+  splat,
+}: BoxOptions = {}): File {
   const { positions, normals, indices } = box(half);
   const parts: Uint8Array[] = [];
   const views: object[] = [];
@@ -78,14 +86,23 @@ export function boxGlb({ half = [0.5, 0.5, 0.5], colour = [1, 0, 0], moves, spla
     scenes: [{ nodes: [0] }],
     nodes: [{ mesh: 0 }],
     meshes: [{ primitives }],
-    materials: [{ emissiveFactor: colour, pbrMetallicRoughness: { baseColorFactor: [0, 0, 0, 1], metallicFactor: 0 } }],
-    ...(splat && { extensionsUsed: ['KHR_gaussian_splatting'] }),
+    materials: [material(surface, colour)],
+    extensionsUsed: ['KHR_materials_unlit', ...(splat ? ['KHR_gaussian_splatting'] : [])],
     ...(animations.length > 0 && { animations }),
     accessors,
     bufferViews: views,
     buffers: [{ byteLength: parts.reduce((sum, { byteLength }) => sum + byteLength, 0) }],
   };
   return new File([glb(json, parts)], 'box.glb');
+}
+
+function material(surface: 'shining' | 'unlit' | 'rough', colour: readonly number[]): object {
+  const base = surface === 'shining' ? [0, 0, 0] : colour;
+  return {
+    pbrMetallicRoughness: { baseColorFactor: [...base, 1], metallicFactor: 0 },
+    ...(surface === 'shining' && { emissiveFactor: colour }),
+    ...(surface === 'unlit' && { extensions: { KHR_materials_unlit: {} } }),
+  };
 }
 
 function animation(moves: number, floats: (values: readonly number[], type: string, more?: object) => number): object {

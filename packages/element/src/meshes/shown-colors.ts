@@ -1,0 +1,18 @@
+/** The colors in which meshes are drawn: those of the screen, so that they blend with splats, which are trained in them. */
+import { neutralToneMapping, output, sRGBTransferOETF, vec4, type Material, type Texture } from './three.js';
+
+/** Of the light around, so that a rough gray surface that faces the camera keeps its base color. */
+const EVEN_LIGHT = 0.62;
+
+/** Lit materials go through Khronos' PBR Neutral. An unlit one (`KHR_materials_unlit`) has its base color. */
+export function showAsDisplayed(material: Material): void {
+  const light = material.isMeshBasicMaterial ? output.rgb : neutralToneMapping(output.rgb, 1);
+  material.outputNode = vec4(sRGBTransferOETF(light.clamp(0, 1)), output.a);
+}
+
+/** Lights a material from all around. An unlit one has an `envMap`, too, of mirrors. */
+export function light(material: Material, environment: Texture): void {
+  if (material.isMeshBasicMaterial || !('envMap' in material)) return;
+  material.envMap = environment;
+  material.envMapIntensity = EVEN_LIGHT;
+}
