@@ -145,6 +145,7 @@ test('2D Gaussians without scale_2 are flat discs', async () => {
     assert.ok(cloud.scales[3 * i] > 0, 'some width');
     assert.equal(cloud.scales[3 * i + 2], 0);
   }
+  assert.match(cloud.warnings?.join() ?? '', /2DGS/, 'they are drawn otherwise than trained');
 });
 
 test('plain colours become the constant coefficient', async () => {

@@ -66,6 +66,14 @@ test('a codebook without its first entry, as early tools wrote it, goes on one s
   await expectRefusal(bundle({ ...files, 'meta.json': json }), 'decode/header', /scales\.codebook/, { name: 'a.sog' });
 });
 
+test('2D Gaussians, as splat-transform marks them, bring a warning', async () => {
+  const files = writeSog(cloud);
+  const meta = JSON.parse(new TextDecoder().decode(files['meta.json'])) as object;
+  const marked = { ...files, 'meta.json': new TextEncoder().encode(JSON.stringify({ ...meta, model: '2dgs' })) };
+  assert.match((await readScene(bundle(marked), { name: 'a.sog' })).warnings?.join() ?? '', /2DGS/);
+  assert.equal((await readScene(bundle(files), { name: 'a.sog' })).warnings, undefined);
+});
+
 test('images and descriptions that contradict each other are refused by name', async () => {
   const files = writeSog(cloud);
   const meta = JSON.parse(new TextDecoder().decode(files['meta.json'])) as Record<string, Record<string, unknown>>;

@@ -21,6 +21,10 @@ export function damaged(
 export const DEGREE_4 =
   'Spherical harmonics of degree 4 are drawn up to degree 3; the finest changes of colour with direction are left out.';
 
+/** What is said of 2D Gaussians. */
+export const FLAT =
+  'The splats are 2D Gaussians (2DGS). They are drawn as flat 3D Gaussians: edges and thin parts look a little wider and paler than 2DGS draws them.';
+
 /** Adds a sentence about what is not drawn, once. */
 export function warn(cloud: DraftCloud, sentence: string): void {
   const { warnings = [] } = cloud;

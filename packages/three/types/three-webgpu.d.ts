@@ -107,6 +107,8 @@ export class WebGPURenderer {
   init(): Promise<this>;
   setSize(width: number, height: number, updateStyle?: boolean): void;
   dispose(): void;
+  toneMapping: ToneMapping;
+  readonly isOutputTarget: boolean;
   readonly backend: {
     readonly isWebGPUBackend?: boolean;
     readonly device?: GPUDevice | null;
@@ -121,3 +123,6 @@ export class WebGPURenderer {
 export const FloatType: number;
 export const HalfFloatType: number;
 export const WebGPUCoordinateSystem: number;
+export type ToneMapping = number;
+export const NoToneMapping: ToneMapping;
+export const ACESFilmicToneMapping: ToneMapping;

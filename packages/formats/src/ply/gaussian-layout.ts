@@ -119,7 +119,10 @@ export async function loadMeaning(
     ({ name, properties }) =>
       ODD.test(name) || (/^(vertex|sh)$/.test(name) && properties.some((own) => !PLAIN.test(own.name))),
   );
-  if (comments.length === 0 && !isOdd && !OFFSETS.test(fileName)) return undefined;
+  const isFlat = elements.some(
+    ({ name, properties }) => name === 'vertex' && !properties.some((own) => own.name === 'scale_2'),
+  );
+  if (comments.length === 0 && !isOdd && !isFlat && !OFFSETS.test(fileName)) return undefined;
   return importMeaning();
 }
 

@@ -2,7 +2,7 @@
 import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
-import { DEGREE_4, warn } from '../faults.js';
+import { DEGREE_4, FLAT, warn } from '../faults.js';
 import { OFFSETS, PLAIN } from './gaussian-layout.js';
 import type { PlyHeader } from './header.js';
 
@@ -87,6 +87,7 @@ export function noteLeftOut(cloud: DraftCloud, { elements }: PlyHeader, fileName
       .flatMap((own) => own.properties.map((property) => property.name));
   const names = properties('vertex');
   if ([...names, ...properties('sh')].includes('f_rest_45')) warn(cloud, DEGREE_4);
+  if (names.includes('scale_1') && !names.includes('scale_2')) warn(cloud, FLAT);
   const unread = names.filter((name) => !PLAIN.test(name) && !READ.test(name));
   if (unread.length > 0) {
     const listed = unread.slice(0, 6).join(', ') + (unread.length > 6 ? `, ... (${unread.length})` : '');

@@ -15,6 +15,8 @@ export interface SogMeta {
   readonly filterVariance: number | undefined;
   /** What our own writer says of scenes that are ordered pixel by pixel: `sortingMethod: pixel`. */
   readonly order: 'pixel' | undefined;
+  /** 2D Gaussians (2DGS): `model: 2dgs` of splat-transform. */
+  readonly isFlat: boolean;
   readonly means: {
     readonly mins: readonly number[];
     readonly maxs: readonly number[];
@@ -85,6 +87,7 @@ export function parseSogMeta(source: JsonSource): SogMeta {
     antialiased: json.antialias === true || json.model === 'antialiased',
     filterVariance: json.model === 'antialiased' ? 0.1 : undefined,
     order: json.sortingMethod === 'pixel' ? 'pixel' : undefined,
+    isFlat: json.model === '2dgs',
     means: { mins: numbers('means', 'mins', 3), maxs: numbers('means', 'maxs', 3), files: files('means', 2) },
     scales: { values: isFirst ? between('scales', 3) : repeated(codebook('scales'), 3), files: files('scales', 1) },
     quats: { files: files('quats', 1) },

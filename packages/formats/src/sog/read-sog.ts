@@ -1,7 +1,7 @@
 import { loadModule, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped, startsWith } from '../bytes.js';
 import { allocateCloud, DEGREE_OF_REST_COUNT, type DraftCloud } from '../cloud.js';
-import { damaged } from '../faults.js';
+import { damaged, FLAT, warn } from '../faults.js';
 import { previewWanted, type OpenPart, type SceneSource } from '../scene-format.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
 import type { WebpImage } from '../webp/decode.js';
@@ -97,6 +97,7 @@ function unpackGeometry(
   const selection: Selection = { count: Math.ceil(meta.count / step), step };
   const cloud = allocateCloud(selection.count, degree, source);
   cloud.antialiased = meta.antialiased;
+  if (meta.isFlat) warn(cloud, FLAT);
   cloud.filterVariance = meta.filterVariance;
   if (meta.order) cloud.hints = { order: meta.order };
   unpackMeans(planes.low, planes.high, meta.means, selection, cloud.positions);

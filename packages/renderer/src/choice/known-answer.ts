@@ -8,32 +8,50 @@ import type { GaussianScene } from '../gaussian-scene.js';
 import type { FrameSettings } from '../frame-target.js';
 import { UncheckedViewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
+import { sorts } from './sorts.js';
 
 /** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
 const TOLERANCE = 0.02;
-const SPLATS = 64;
+/** Large splats that lie over much of the picture. */
+const LARGE = 64;
+/** Small ones, so many that each stage has several workgroups, the last of them not full, and the sort two blocks. A third is outside the picture. */
+const SMALL = 4_500;
+/** Several bins of the tiles, none of which fits. */
+const [WIDTH, HEIGHT] = [148, 92];
+/** Of frames in motion and of frames at rest: shares of the visible range of depths, and depths. */
+const KEY_BITS = [16, 32] as const;
 const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 
-/** True if a renderer with these options draws the image that the mathematics ask for. */
+/** True if a renderer with these options draws the image that the mathematics ask for: of two scenes, whose splats lie among one another. */
 export async function givesKnownAnswer(device: GPUDevice, options: FrameSettings): Promise<boolean> {
-  const cloud = sphereCloud(SPLATS, 1);
-  const camera = shearedCamera(48, 32);
-  const gaussians = await GaussianBuffers.upload(device, packSpheres(cloud, 'float16'));
-  const renderer = viewpointOf(device, gaussians, options);
+  if (!(await sorts(device, options.threads === 'serial' ? 'serial' : 'parallel'))) return false;
+  const clouds = [sphereCloud(LARGE, 1), sphereCloud(SMALL, 0.13, 2.4)];
+  const camera = shearedCamera(WIDTH, HEIGHT);
+  const scenes = await Promise.all(
+    clouds.map((cloud) => GaussianBuffers.upload(device, packSpheres(cloud, 'float16'))),
+  );
+  const renderer = viewpointOf(device, scenes, options);
   try {
-    const pixels = await capture(device, renderer, { camera });
-    const expected = drawSpheres(cloud, camera);
-    return pixels.every((value, i) => Math.abs(value - expected[i]) <= TOLERANCE);
+    const expected = drawSpheres(clouds, camera);
+    for (const depthKeyBits of KEY_BITS) {
+      const pixels = await capture(device, renderer, { camera, settings: { ...options, depthKeyBits } });
+      if (!pixels.every((value, i) => Math.abs(value - expected[i]) <= TOLERANCE)) return false;
+    }
+    return true;
   } finally {
     renderer.destroy();
-    gaussians.destroy();
+    for (const scene of scenes) scene.destroy();
   }
 }
 
-/** A viewpoint of one scene alone. */
-export function viewpointOf(device: GPUDevice, scene: GaussianScene, settings: FrameSettings): UncheckedViewpoint {
+/** A viewpoint of these scenes alone. */
+export function viewpointOf(
+  device: GPUDevice,
+  scenes: readonly GaussianScene[],
+  settings: FrameSettings,
+): UncheckedViewpoint {
   const world = new World();
-  world.add({ scene });
+  for (const scene of scenes) world.add({ scene });
   return new UncheckedViewpoint(device, world, { settings });
 }
 
@@ -51,8 +69,11 @@ function shearedCamera(width: number, height: number): Camera {
   return { ...camera, worldToCamera: multiply(shear, camera.worldToCamera) };
 }
 
-/** Splats that are spheres, of random place, size, opacity and view-dependent colour; the same on every machine. */
-export function sphereCloud(count: number, size: number): GaussianCloud {
+/**
+ * Splats that are spheres, of random place, size, opacity and view-dependent colour; the same on every machine.
+ * @param side of the cube that their centers lie in
+ */
+export function sphereCloud(count: number, size: number, side = 1.6): GaussianCloud {
   let state = 1;
   const random = (): number => (state = (state * 48271) % 0x7fffffff) / 0x7fffffff;
   const fill = (length: number, value: (i: number) => number): Float32Array =>
@@ -64,7 +85,7 @@ export function sphereCloud(count: number, size: number): GaussianCloud {
     antialiased: false,
     origin: [0, 0, 0],
     droppedCount: 0,
-    positions: fill(3 * count, () => 1.6 * (random() - 0.5)),
+    positions: fill(3 * count, () => side * (random() - 0.5)),
     scales: fill(3 * count, (i) => radii[Math.floor(i / 3)]),
     rotations: fill(4 * count, (i) => (i % 4 === 0 ? 1 : 0)),
     opacities: fill(count, () => 0.2 + 0.75 * random()),
@@ -95,20 +116,30 @@ export function packSpheres(
 }
 
 /** The image in float64, front to back: spheres have closed forms where other splats need matrices. */
-function drawSpheres(cloud: GaussianCloud, camera: Camera): Float64Array {
-  const { width, height } = camera;
+function drawSpheres(clouds: readonly GaussianCloud[], camera: Camera): Float64Array {
+  const { width, height, near } = camera;
   const pixels = new Float64Array(4 * width * height).map((_, i) => (i % 4 === 3 ? 1 : 0));
-  const spheres = Array.from({ length: cloud.count }, (_, i) => projectSphere(cloud, i, camera));
-  for (const sphere of spheres.sort((a, b) => a.depth - b.depth)) {
-    for (let i = 0; i < width * height; i++) {
-      const alpha = alphaAt(sphere, (i % width) + 0.5, Math.floor(i / width) + 0.5);
-      const light = pixels[4 * i + 3];
+  const spheres = clouds.flatMap((cloud) => Array.from({ length: cloud.count }, (_, i) => projectSphere(cloud, i, camera)));
+  const visible = spheres.filter(({ depth }) => depth >= near);
+  for (const sphere of visible.sort((a, b) => a.depth - b.depth)) drawSphere(pixels, sphere, camera);
+  return pixels.map((value, i) => (i % 4 === 3 ? 1 - value : value));
+}
+
+function drawSphere(pixels: Float64Array, sphere: Sphere, { width, height }: Camera): void {
+  const reach = Math.sqrt(2 * Math.log(sphere.opacity / ALPHA_MIN));
+  const [across, down] = [reach * Math.sqrt(sphere.xx), reach * Math.sqrt(sphere.yy)];
+  const lastRow = Math.min(height - 1, Math.floor(sphere.y + down));
+  const lastColumn = Math.min(width - 1, Math.floor(sphere.x + across));
+  for (let y = Math.max(0, Math.floor(sphere.y - down)); y <= lastRow; y++) {
+    for (let x = Math.max(0, Math.floor(sphere.x - across)); x <= lastColumn; x++) {
+      const i = 4 * (width * y + x);
+      const alpha = alphaAt(sphere, x + 0.5, y + 0.5);
+      const light = pixels[i + 3];
       if (alpha < ALPHA_MIN || light * (1 - alpha) <= 1e-4) continue;
-      sphere.color.forEach((value, channel) => (pixels[4 * i + channel] += light * alpha * value));
-      pixels[4 * i + 3] = light * (1 - alpha);
+      for (let channel = 0; channel < 3; channel++) pixels[i + channel] += light * alpha * sphere.color[channel];
+      pixels[i + 3] = light * (1 - alpha);
     }
   }
-  return pixels.map((value, i) => (i % 4 === 3 ? 1 - value : value));
 }
 
 interface Sphere {

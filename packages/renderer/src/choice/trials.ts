@@ -65,7 +65,7 @@ export async function timeFrames(
   const cloud = sphereCloud(splats, size);
   const all = Uint32Array.from({ length: splats }, (_, i) => i);
   const gaussians = await GaussianBuffers.upload(device, packSpheres(cloud, 'int8', order?.(cloud.positions, all)));
-  const renderer = viewpointOf(device, gaussians, variants);
+  const renderer = viewpointOf(device, [gaussians], variants);
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
   const draw = (): void => renderer.draw(camera, { target: texture });
