@@ -8,7 +8,7 @@ import type { GaussianScene } from '../gaussian-scene.js';
 import type { FrameSettings } from '../frame-target.js';
 import { UncheckedViewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
-import { sorts } from './sorts.js';
+import { sumsAndSorts } from './stages-alone.js';
 
 /** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
 const TOLERANCE = 0.02;
@@ -24,7 +24,7 @@ const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 
 /** True if a renderer with these options draws the image that the mathematics ask for: of two scenes, whose splats lie among one another. */
 export async function givesKnownAnswer(device: GPUDevice, options: FrameSettings): Promise<boolean> {
-  if (!(await sorts(device, options.threads === 'serial' ? 'serial' : 'parallel'))) return false;
+  if (!(await sumsAndSorts(device, options.threads === 'serial' ? 'serial' : 'parallel'))) return false;
   const clouds = [sphereCloud(LARGE, 1), sphereCloud(SMALL, 0.13, 2.4)];
   const camera = shearedCamera(WIDTH, HEIGHT);
   const scenes = await Promise.all(
@@ -119,7 +119,9 @@ export function packSpheres(
 function drawSpheres(clouds: readonly GaussianCloud[], camera: Camera): Float64Array {
   const { width, height, near } = camera;
   const pixels = new Float64Array(4 * width * height).map((_, i) => (i % 4 === 3 ? 1 : 0));
-  const spheres = clouds.flatMap((cloud) => Array.from({ length: cloud.count }, (_, i) => projectSphere(cloud, i, camera)));
+  const spheres = clouds.flatMap((cloud) =>
+    Array.from({ length: cloud.count }, (_, i) => projectSphere(cloud, i, camera)),
+  );
   const visible = spheres.filter(({ depth }) => depth >= near);
   for (const sphere of visible.sort((a, b) => a.depth - b.depth)) drawSphere(pixels, sphere, camera);
   return pixels.map((value, i) => (i % 4 === 3 ? 1 - value : value));

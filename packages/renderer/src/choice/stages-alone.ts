@@ -1,0 +1,83 @@
+/** Stages by themselves, with more to do than a small picture gives them. */
+import { constants, layouts } from '../generated/shaders.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
+import { GpuMemory } from '../gpu/memory.js';
+import { PlanStage, scanBytes, type Threads } from '../stages/plan.js';
+import { SortStage } from '../stages/sort.js';
+
+const { DIGITS, SORT_BLOCK } = constants;
+/** So many that the sums over blocks are shared among threads; the last block is not full. */
+const BLOCKS = 19;
+const KEYS = BLOCKS * SORT_BLOCK - 100;
+/** More than a workgroup sums up in one step. */
+const COUNTS = 5_003;
+const WORD = 4;
+
+/** True if prefix sums and the sort of more numbers than a picture of the self-test has are right. */
+export async function sumsAndSorts(device: GPUDevice, threads: Threads): Promise<boolean> {
+  const memory = new GpuMemory(device);
+  const { storage, uniform, copySource, copyDestination, mapRead } = BUFFER_USAGE;
+  const make = (content: number | Uint32Array, usage: number = storage): GPUBuffer => {
+    const [bytes, words] = typeof content === 'number' ? [content, undefined] : [content.byteLength, content];
+    return memory.buffer('gs.probe', bytes, usage | copySource | copyDestination, words);
+  };
+  const keys = Uint32Array.from({ length: KEYS }, (_, i) => Math.imul(i % 9001, 0x9e3779b1));
+  const order = [make(keys.byteLength), make(keys.byteLength)] as const;
+  const sort = new SortStage(device, threads);
+  const passes = sort.bind({
+    plan: make(planOf(KEYS)),
+    keys: [make(keys), make(keys.byteLength)],
+    values: order,
+    digitCounts: make(WORD * DIGITS * BLOCKS),
+    digitTotals: make(WORD * DIGITS),
+  });
+  const counts = new Uint32Array(scanBytes(COUNTS) / WORD).map((_, i) => (7 * i) % 257);
+  const values = make(counts);
+  const plan = new PlanStage(device, threads);
+  const sums = plan.bind({
+    values,
+    limits: make(Uint32Array.of(1, 0xffffffff, COUNTS, 0), uniform),
+    page_ranges: make(Uint32Array.of(0, COUNTS)),
+    plan: make(planOf(0)),
+  });
+  const staging = memory.buffer('gs.probe', WORD * (KEYS + COUNTS), mapRead | copyDestination);
+  const encoder = device.createCommandEncoder({ label: 'gs.probe' });
+  const pass = encoder.beginComputePass({ label: 'gs.probe' });
+  sort.record(pass, passes, KEYS);
+  plan.record(pass, sums);
+  pass.end();
+  encoder.copyBufferToBuffer(order[0], 0, staging, 0, WORD * KEYS);
+  encoder.copyBufferToBuffer(values, 0, staging, WORD * KEYS, WORD * COUNTS);
+  device.queue.submit([encoder.finish()]);
+  try {
+    await staging.mapAsync(0x1);
+    const found = new Uint32Array(staging.getMappedRange());
+    return isOrder(found.subarray(0, KEYS), keys) && areSums(found.subarray(KEYS), counts);
+  } finally {
+    memory.destroy();
+  }
+}
+
+function planOf(keys: number): Uint32Array {
+  const { fields, size } = layouts.Plan;
+  const plan = new Uint32Array((size + layouts.PagePlan.size) / WORD);
+  plan[fields.visible.offset / WORD] = keys;
+  plan[fields.sort_blocks.offset / WORD] = Math.ceil(keys / SORT_BLOCK);
+  return plan;
+}
+
+/** Strictly ascending by key and place: then each place is there once. */
+const isOrder = (order: Uint32Array, keys: Uint32Array): boolean =>
+  order.every((place, i) => {
+    const [key, before] = [keys[place], keys[order[i - 1]]];
+    return place < KEYS && (i === 0 || before < key || (before === key && order[i - 1] < place));
+  });
+
+function areSums(found: Uint32Array, counts: Uint32Array): boolean {
+  let sum = 0;
+  return found.every((value, i) => {
+    const expected = sum;
+    sum += counts[i];
+    return value === expected;
+  });
+}
