@@ -13,11 +13,11 @@ import { sumsAndSorts } from './stages-alone.js';
 /** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
 const TOLERANCE = 0.02;
 /** Large splats that lie over much of the picture. */
-const LARGE = 64;
+const LARGE = 40;
 /** Small ones, so many that each stage has several workgroups, the last of them not full, and the sort two blocks. A third is outside the picture. */
 const SMALL = 4_500;
 /** Several bins of the tiles, none of which fits. */
-const [WIDTH, HEIGHT] = [148, 92];
+const [WIDTH, HEIGHT] = [276, 136];
 /** Of frames in motion and of frames at rest: shares of the visible range of depths, and depths. */
 const KEY_BITS = [16, 32] as const;
 const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
@@ -25,7 +25,7 @@ const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 /** True if a renderer with these options draws the image that the mathematics ask for: of two scenes, whose splats lie among one another. */
 export async function givesKnownAnswer(device: GPUDevice, options: FrameSettings): Promise<boolean> {
   if (!(await sumsAndSorts(device, options.threads === 'serial' ? 'serial' : 'parallel'))) return false;
-  const clouds = [sphereCloud(LARGE, 1), sphereCloud(SMALL, 0.13, 2.4)];
+  const clouds = [sphereCloud(LARGE, 0.8), sphereCloud(SMALL, 0.08, 2.4)];
   const camera = shearedCamera(WIDTH, HEIGHT);
   const scenes = await Promise.all(
     clouds.map((cloud) => GaussianBuffers.upload(device, packSpheres(cloud, 'float16'))),
