@@ -19,7 +19,7 @@ const RARE = {
   'streamed-shaders': ['move_slots', 'note_wishes'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
   'probe-shaders': ['probe_depth', 'probe_surface', 'probe_surface_quantized'],
-  'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
+  'depth-shaders': ['blend_layers', 'rasterize_quads_depth', 'rasterize_tiles_depth'],
   'linear-shaders': ['compose_linear'],
   'order-shaders': ['pixel_depths', 'pixel_depths_quantized', 'rasterize_tiles_order'],
 };

@@ -1,4 +1,4 @@
-// Draws quads with what else is in the picture: splats behind that are left out, pixel by pixel.
+// Draws quads with what else is in the picture. Splats behind it are left out, pixel by pixel; with layers, those that are not behind `part` of them.
 #import shared/scene_depth
 #import shared/quads
 
@@ -6,6 +6,11 @@
 // Camera depths by slot.
 @group(0) @binding(5) var<storage, read> depths: array<f32>;
 @group(0) @binding(6) var stored_depth: texture_2d<f32>;
+@group(0) @binding(7) var layer_color: texture_2d<f32>;
+@group(0) @binding(8) var second_depth: texture_2d<f32>;
+@group(0) @binding(9) var second_color: texture_2d<f32>;
+
+override part: u32 = 0u;
 
 struct DeepQuad {
   @builtin(position) position: vec4f,
@@ -27,8 +32,10 @@ fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) ins
 
 @fragment
 fn fragment(quad: DeepQuad) -> @location(0) vec4f {
-  let texel = vec2u(floor(quad.position.xy) * scene.scale + 0.5 * scene.scale);
-  if (quad.depth > depth_limit(scene, textureLoad(stored_depth, texel, 0).r)) { discard; }
+  let texel = scene_texel(floor(quad.position.xy) + 0.5);
+  var in_front = u32(quad.depth > limit_at(texel));
+  if (layers == 2u) { in_front += u32(quad.depth > depth_limit(scene, textureLoad(second_depth, texel, 0).r)); }
+  if (in_front != part) { discard; }
   let offset = quad.position.xy - quad.shape.xy;
   let alpha = alpha_at(offset, quad.shape.z, quad.shape.w, quad.inverse_sigma_v, quad.color.a);
   if (alpha < ALPHA_MIN) { discard; }

@@ -20,7 +20,8 @@ fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
 }
 
 fn start_hiding(position: vec2u) {}
-fn hidden_by(light: Column, k: u32) -> Column { return light; }
+fn hide(pixels: ptr<function, Pixels>, k: u32) {}
+fn hide_rest(pixels: ptr<function, Pixels>) {}
 
 fn clear_notes(lane: u32) {
   atomicStore(&weights[lane], 0u);

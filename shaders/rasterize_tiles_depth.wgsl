@@ -1,4 +1,4 @@
-// Paints tiles with meshes in the scene: a pixel ends at their depth; and writes the depth of the splats.
+// Paints tiles with meshes in the scene, which end pixels or are layers of them; and writes the depth of the splats.
 #import shared/scene_depth
 #import shared/paint_columns
 #import shared/median_depth
@@ -9,26 +9,62 @@
 @group(0) @binding(9) var stored_depth: texture_2d<f32>;
 // Receives the depth at which half of the light is gone; 0 where more passes.
 @group(0) @binding(10) var median_depth: texture_storage_2d<r32float, write>;
+@group(0) @binding(11) var layer_color: texture_2d<f32>;
+@group(0) @binding(12) var second_depth: texture_2d<f32>;
+@group(0) @binding(13) var second_color: texture_2d<f32>;
 
 override tests_depth: bool = true;
 override tells_depth: bool = false;
 
+// Of a thread's pixels: the topmost, the depth of the next layer, and the layers that are blended.
+var<private> topmost: vec2u;
 var<private> limits: Column;
+var<private> passed: vec4u;
 
 fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) { batch_depths[k] = depths[slot]; }
 
+fn texel_of(row: u32) -> vec2u { return scene_texel(vec2f(topmost + vec2u(0u, row)) + 0.5); }
+
 fn start_hiding(position: vec2u) {
   if (!tests_depth) { return; }
+  topmost = position;
   for (var row = 0u; row < COLUMN; row++) {
-    let texel = vec2u((vec2f(position + vec2u(0u, row)) + 0.5) * scene.scale);
-    limits[row] = depth_limit(scene, textureLoad(stored_depth, texel, 0).r);
+    if (layers == 0u) { limits[row] = limit_at(texel_of(row)); } else { limits[row] = layer_at(texel_of(row), 0u).depth; }
   }
 }
 
-// Splats behind a hidden one are hidden, too: no light is left for them.
-fn hidden_by(light: Column, k: u32) -> Column {
-  if (!tests_depth) { return light; }
-  return select(light, Column(0.0), Column(batch_depths[k]) > limits);
+// Blends the next layer of a pixel, unless the pixel is finished.
+fn blend_layer(pixels: ptr<function, Pixels>, row: u32) {
+  let layer = layer_at(texel_of(row), passed[row]);
+  passed[row]++;
+  limits[row] = layer_at(texel_of(row), passed[row]).depth;
+  let before = (*pixels).light[row];
+  if (before <= view.transmittance_min) { return; }
+  (*pixels).red[row] += before * layer.color.r;
+  (*pixels).green[row] += before * layer.color.g;
+  (*pixels).blue[row] += before * layer.color.b;
+  (*pixels).light[row] = before * (1.0 - layer.color.a);
+  (*pixels).transmittance[row] = (*pixels).light[row];
+}
+
+// Before splat k of the batch: layers that are nearer come first. A depth without a layer leaves no light for what is behind it.
+fn hide(pixels: ptr<function, Pixels>, k: u32) {
+  if (!tests_depth) { return; }
+  let is_behind = Column(batch_depths[k]) > limits;
+  if (layers == 0u) {
+    (*pixels).light = select((*pixels).light, Column(0.0), is_behind);
+  } else if (any(is_behind)) {
+    for (var row = 0u; row < COLUMN; row++) {
+      while (batch_depths[k] > limits[row]) { blend_layer(pixels, row); }
+    }
+  }
+}
+
+fn hide_rest(pixels: ptr<function, Pixels>) {
+  if (!tests_depth) { return; }
+  for (var row = 0u; row < COLUMN; row++) {
+    while (passed[row] < layers) { blend_layer(pixels, row); }
+  }
 }
 
 fn clear_notes(lane: u32) {}

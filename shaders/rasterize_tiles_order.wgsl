@@ -12,6 +12,9 @@
 @group(0) @binding(10) var stored_depth: texture_2d<f32>;
 // Receives the depth at which half of the light is gone; 0 where more passes.
 @group(0) @binding(11) var median_depth: texture_storage_2d<r32float, write>;
+@group(0) @binding(12) var layer_color: texture_2d<f32>;
+@group(0) @binding(13) var second_depth: texture_2d<f32>;
+@group(0) @binding(14) var second_color: texture_2d<f32>;
 
 const SIDE: u32 = SORTED_TILE;
 const COLUMN: u32 = 1u;
@@ -47,7 +50,10 @@ var<workgroup> slopes: array<vec2f, BATCH + 1u>;
 // Depth from which steps are counted, as the bits of a float32, and the bits of such a number that a step leaves out.
 var<private> first_depth: u32;
 var<private> step_bits: u32;
+// Depth of the next layer, layers that are blended, and the texel of all of them.
 var<private> limit: f32;
+var<private> passed: u32;
+var<private> own_texel: vec2u;
 var<private> half_depth: f32;
 
 // Four splats of a pixel. Of each: its depth in 20 bits above its alpha in 12, 0 where there is none, so that nothing comes before everything else; and its colour, three numbers
@@ -109,7 +115,10 @@ fn start_pixels(pixel: vec2u) -> Pixel {
   first_depth = max(~gathered[NEAREST_INVERTED], margin) - margin;
   let range = max(gathered[FARTHEST] + margin, first_depth) - first_depth;
   step_bits = max(32u - min(countLeadingZeros(range), 32u), DEPTH_BITS) - DEPTH_BITS;
-  if (tests_depth) { limit = depth_limit(scene, textureLoad(stored_depth, vec2u((vec2f(pixel) + 0.5) * scene.scale), 0).r); }
+  if (tests_depth) {
+    own_texel = scene_texel(vec2f(pixel) + 0.5);
+    if (layers == 0u) { limit = limit_at(own_texel); } else { limit = layer_at(own_texel, 0u).depth; }
+  }
   return Pixel(vec3f(0.0), 1.0, view.transmittance_min);
 }
 
@@ -137,7 +146,7 @@ fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
   let steps = min((max(bitcast<u32>(depth), first_depth) - first_depth) >> step_bits, DEPTH_MASK);
   let alpha = min(ALPHA_MAX, exp2(power));
   let key = (steps << ALPHA_BITS) | whole(alpha * f32(ALPHA_MASK));
-  let is_seen = power >= least_power && (!tests_depth || depth <= limit);
+  let is_seen = power >= least_power && (!tests_depth || layers > 0u || depth <= limit);
   return vec2u(select(0u, key, is_seen), paint.z);
 }
 
@@ -230,7 +239,20 @@ fn merge_into(
   *z = f;
 }
 
+fn blend_layer(pixel: ptr<function, Pixel>) {
+  let layer = layer_at(own_texel, passed);
+  passed++;
+  limit = layer_at(own_texel, passed).depth;
+  if (are_finished(*pixel)) { return; }
+  (*pixel).color += (*pixel).transmittance * layer.color.rgb;
+  (*pixel).transmittance *= 1.0 - layer.color.a;
+  if ((*pixel).transmittance <= (*pixel).least) { (*pixel).least = FINISHED; }
+}
+
 fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
+  if (tests_depth && layers > 0u) {
+    while (depth_of(key) > limit) { blend_layer(pixel); }
+  }
   let before = (*pixel).transmittance;
   let full_weight = before * (number(key & ALPHA_MASK) / f32(ALPHA_MASK));
   let remaining = before - full_weight;
@@ -319,6 +341,7 @@ fn finish_pixels(pixel: ptr<function, Pixel>, position: vec2u) {
     blend_four(pixel, window_6);
     blend_four(pixel, window_7);
   }
+  while (passed < layers) { blend_layer(pixel); }
   if (tells_depth) { textureStore(median_depth, position, vec4f(half_depth)); }
   store_pixel(position, (*pixel).color, (*pixel).transmittance);
 }

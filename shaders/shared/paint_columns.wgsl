@@ -1,5 +1,5 @@
 // How a column of four pixels takes the splats of a batch: as they are listed, by the depth of their centers. What a splat costs a thread, whatever the pixel, it costs once
-// for four. Whoever imports this says what hides splats (`start_hiding`, `hidden_by`) and what is noted on the way (`note_blend`, `note_pixel`).
+// for four. Whoever imports this says what hides splats (`start_hiding`, `hide`, `hide_rest`) and what is noted on the way (`note_blend`, `note_pixel`).
 #import shared/paint_tiles
 
 const SIDE: u32 = TILE;
@@ -42,7 +42,8 @@ fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, least_power: f32) 
   let v = axis.w * (place.y + STEPS) + (axis.z * place.x + bitcast<f32>(paint.x));
   let power = (bitcast<f32>(paint.y) - u * u) - v * v;
   let alpha = select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(least_power));
-  let before = hidden_by((*pixels).light, k);
+  hide(pixels, k);
+  let before = (*pixels).light;
   let full_weight = before * alpha;
   let after = before - full_weight;
   var is_blended = after > Column(view.transmittance_min);
@@ -74,6 +75,7 @@ fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, leas
 }
 
 fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
+  hide_rest(pixels);
   for (var row = 0u; row < COLUMN; row++) {
     let pixel = position + vec2u(0u, row);
     if (any(vec2f(pixel) >= view.viewport)) { break; }

@@ -1,4 +1,5 @@
-// Depth of what else is in the picture: meshes that a host has drawn.
+// What else is in the picture: meshes that a host has drawn, by their depth alone, or as layers of color among the splats. Stages declare the textures: `stored_depth`, and for
+// layers `layer_color`, `second_depth`, `second_color`; and the uniform `scene`.
 struct SceneDepth {
   // A stored value d is the camera depth (x d + y) / (z d + w) in world units.
   inverse: vec4f,
@@ -15,4 +16,29 @@ fn depth_limit(scene: SceneDepth, stored: f32) -> f32 {
   let below = scene.inverse.z * stored + scene.inverse.w;
   let depth = (scene.inverse.x * stored + scene.inverse.y) / below;
   return select(depth, NO_LIMIT, stored == scene.nothing || below <= 0.0);
+}
+
+// Layers of color: 0 where the depth just ends the pixel; up to 2.
+override layers: u32 = 0u;
+
+struct Layer {
+  // Premultiplied; alpha is the coverage of the pixel times the opacity.
+  color: vec4f,
+  // Camera depth; NO_LIMIT where there is nothing.
+  depth: f32,
+}
+
+// Texel for a place in the image, in pixels that are drawn.
+fn scene_texel(place: vec2f) -> vec2u { return vec2u(place * scene.scale); }
+
+fn limit_at(texel: vec2u) -> f32 { return depth_limit(scene, textureLoad(stored_depth, texel, 0).r); }
+
+// Layer number `nth` of a texel, counted from the nearest one.
+fn layer_at(texel: vec2u, nth: u32) -> Layer {
+  if (nth >= layers) { return Layer(vec4f(0.0), NO_LIMIT); }
+  let first = Layer(textureLoad(layer_color, texel, 0), limit_at(texel));
+  if (layers == 1u) { return first; }
+  let second = Layer(textureLoad(second_color, texel, 0), depth_limit(scene, textureLoad(second_depth, texel, 0).r));
+  let is_second = (second.depth < first.depth) == (nth == 0u);
+  return Layer(select(first.color, second.color, is_second), select(first.depth, second.depth, is_second));
 }

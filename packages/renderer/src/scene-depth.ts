@@ -1,5 +1,5 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import { rasterizeQuadsDepth, rasterizeTilesDepth } from './generated/depth-shaders.js';
+import { blendLayers, rasterizeQuadsDepth, rasterizeTilesDepth } from './generated/depth-shaders.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Overrides } from './gpu/kernel.js';
 import { writeStruct } from './gpu/struct.js';
@@ -21,6 +21,13 @@ export interface HostDepth {
   /** Planes of the host's projection, world units; default: the camera's. `far` may be Infinity. */
   readonly near?: number | undefined;
   readonly far?: number | undefined;
+  /**
+   * What is there: a layer among the splats, blended where its depth is passed, in place of a depth at which pixels just end. Premultiplied, in the encoded colors of splats;
+   * alpha is the share of the pixel that it covers, so that antialiased edges show the splats behind. As large as {@link texture}, usage TEXTURE_BINDING.
+   */
+  readonly color?: GPUTexture | undefined;
+  /** A second layer, before or behind the first, pixel by pixel: what is transparent. Of the same kind and size as the first. */
+  readonly second?: { readonly texture: GPUTexture; readonly color: GPUTexture } | undefined;
 }
 
 /** What a frame has to do with depth: at least one of the two. */
@@ -55,6 +62,8 @@ export class SceneDepth implements PaintingDepth {
   readonly #uniform: GPUBuffer;
   readonly #bytes = new ArrayBuffer(layouts.SceneDepth.size);
   readonly #tiles = new BoundImages();
+  readonly #layerViews: Readonly<Record<'layer_color' | 'second_depth' | 'second_color', GPUTextureView>>;
+  #layerBindings: GPUBindGroup | undefined;
   #quads: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
 
   /** @throws GaussianSplatError `argument/value` for a texture that cannot be read or written. */
@@ -67,6 +76,11 @@ export class SceneDepth implements PaintingDepth {
     this.#outTexture = out;
     this.#stored = host ? viewOf(host.texture) : nothing(device);
     this.#out = (out ?? nowhere(device)).createView();
+    this.#layerViews = {
+      layer_color: host?.color?.createView() ?? nothing(device),
+      second_depth: host?.second ? viewOf(host.second.texture) : nothing(device),
+      second_color: host?.second?.color.createView() ?? nothing(device),
+    };
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#uniform = device.createBuffer({ label: 'gs.scene_depth', size: layouts.SceneDepth.size, usage });
   }
@@ -87,11 +101,27 @@ export class SceneDepth implements PaintingDepth {
   }
 
   get overrides(): Overrides {
-    return { tests_depth: +(this.#host !== undefined), tells_depth: +(this.#outTexture !== undefined) };
+    const { layers } = this;
+    return { tests_depth: +(this.#host !== undefined), tells_depth: +(this.#outTexture !== undefined), layers };
+  }
+
+  get layers(): number {
+    const { color, second } = this.#host ?? {};
+    return color ? 1 + +(second !== undefined) : 0;
   }
 
   get resources(): PaintingDepth['resources'] {
-    return { scene: this.#uniform, stored_depth: this.#stored, median_depth: this.#out };
+    return { scene: this.#uniform, stored_depth: this.#stored, median_depth: this.#out, ...this.#layerViews };
+  }
+
+  get layerProgram(): ShaderProgram<typeof blendLayers> {
+    const both = SHADER_STAGE.vertex | SHADER_STAGE.fragment;
+    return perDevice(this.#device, 'blend layers', () => new ShaderProgram(this.#device, blendLayers, both));
+  }
+
+  get layerBindings(): GPUBindGroup {
+    const own = { scene: this.#uniform, stored_depth: this.#stored, ...this.#layerViews };
+    return (this.#layerBindings ??= this.layerProgram.bind(own));
   }
 
   painter(depths: GPUBuffer): TilePainter {
@@ -125,7 +155,7 @@ export class SceneDepth implements PaintingDepth {
   ): GPUBindGroup {
     const key = [depths, ...Object.values(resources)];
     if (!isSame(this.#quads?.key, key)) {
-      const own = { scene: this.#uniform, depths, stored_depth: this.#stored };
+      const own = { scene: this.#uniform, depths, stored_depth: this.#stored, ...this.#layerViews };
       this.#quads = { key, group: program.bind({ ...resources, ...own }) };
     }
     return this.#quads!.group;
@@ -166,7 +196,13 @@ const nowhere = (device: GPUDevice): GPUTexture =>
 const small = (device: GPUDevice, usage: number): GPUTexture =>
   device.createTexture({ label: 'gs.no_depth', size: [1, 1], format: 'r32float', usage });
 
-function requireHost({ texture, near, far }: HostDepth): void {
+function requireHost({ texture, near, far, color, second }: HostDepth): void {
+  for (const own of [color, second?.texture, second?.color]) {
+    if (own && (own.width !== texture.width || own.height !== texture.height))
+      throw wrong('HostDepth.color', 'textures of one size', `${own.width} x ${own.height}`);
+  }
+  if (second && (!color || second.texture.format !== texture.format))
+    throw wrong('HostDepth.second', 'a first layer with color, and depths of one format', second.texture.format);
   const { format, sampleCount, usage } = texture ?? {};
   if (!FORMATS.test(format))
     throw wrong('HostDepth.texture', 'depth32float, depth24plus, depth16unorm or r32float', String(format));

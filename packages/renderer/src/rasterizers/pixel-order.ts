@@ -96,5 +96,8 @@ const noDepth = (device: GPUDevice): DepthResources =>
       scene: device.createBuffer({ label: 'gs.no_depth', size: layouts.SceneDepth.size, usage: BUFFER_USAGE.uniform }),
       stored_depth: texture(TEXTURE_USAGE.textureBinding),
       median_depth: texture(TEXTURE_USAGE.storageBinding),
+      layer_color: texture(TEXTURE_USAGE.textureBinding),
+      second_depth: texture(TEXTURE_USAGE.textureBinding),
+      second_color: texture(TEXTURE_USAGE.textureBinding),
     };
   });

@@ -1,9 +1,10 @@
 import { constants, layouts, rasterizeQuads } from '../generated/shaders.js';
-import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
+import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, type Overrides } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import type {
   AccumulationFormat,
   Painting,
+  PaintingDepth,
   QuadsWithDepth,
   Rasterizer,
   RasterizerInputs,
@@ -75,11 +76,11 @@ export class QuadsRasterizer implements Rasterizer {
 
   record(encoder: GPUCommandEncoder, { surface, timer, depth, depths }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
-    writeStruct(
-      layouts.RasterView,
-      { viewport: [width, height], slice: slice.index, slices: slice.count },
-      this.#uniformBytes,
-    );
+    const layers = depth?.layers ?? 0;
+    // With layers a frame is not divided: a part of the splats lies on both sides of them.
+    if (layers > 0 && slice.index > 0) return;
+    const [index, slices] = layers > 0 ? [0, 1] : [slice.index, slice.count];
+    writeStruct(layouts.RasterView, { viewport: [width, height], slice: index, slices }, this.#uniformBytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
     const pass = encoder.beginRenderPass({
       label: 'gs.rasterize',
@@ -100,11 +101,18 @@ export class QuadsRasterizer implements Rasterizer {
       const resources = { raster: this.#uniform, plan, splats, order };
       // The image may be a part of the texture.
       pass.setViewport(0, 0, width, height, 0, 1);
-      pass.setPipeline(this.#pipeline(deep));
-      pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
       pass.setIndexBuffer(this.#indices, 'uint16');
-      // As many as there is room for: the vertices of those that are not there lie outside.
-      pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));
+      // Layers of what else is in the picture lie between the splats behind and before them.
+      for (let part = layers; part >= 0; part--) {
+        pass.setPipeline(this.#pipeline(deep, { layers, part }));
+        pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
+        // As many as there is room for: the vertices of those that are not there lie outside.
+        pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));
+        if (part === 0) break;
+        pass.setPipeline(this.#layerPipeline(depth!, { layers, nth: part - 1 }));
+        pass.setBindGroup(0, depth!.layerBindings);
+        pass.draw(3);
+      }
     }
     pass.end();
   }
@@ -113,9 +121,16 @@ export class QuadsRasterizer implements Rasterizer {
     this.#uniform.destroy();
   }
 
-  #pipeline(deep?: QuadsWithDepth): GPURenderPipeline {
-    return perDevice(this.#device, `quads ${this.#format}${deep?.name ?? ''}`, () =>
-      makePipeline(this.#device, deep ?? this.#program, this.#format),
+  #pipeline(deep?: QuadsWithDepth, constants: Overrides = {}): GPURenderPipeline {
+    const own = deep ? constants : {};
+    return perDevice(this.#device, `quads ${this.#format}${deep?.name ?? ''} ${JSON.stringify(own)}`, () =>
+      makePipeline(this.#device, deep ?? this.#program, this.#format, own),
+    );
+  }
+
+  #layerPipeline({ layerProgram }: PaintingDepth, constants: Overrides): GPURenderPipeline {
+    return perDevice(this.#device, `layers ${this.#format} ${JSON.stringify(constants)}`, () =>
+      makePipeline(this.#device, layerProgram, this.#format, constants),
     );
   }
 }
@@ -124,6 +139,7 @@ function makePipeline(
   device: GPUDevice,
   program: Pick<Program, 'module' | 'pipelineLayout'>,
   format: AccumulationFormat,
+  constants: Overrides,
 ): GPURenderPipeline {
   const { module, pipelineLayout } = program;
   const blend: GPUBlendState = {
@@ -135,7 +151,7 @@ function makePipeline(
     label: `gs.rasterize.quads.${format}`,
     layout: pipelineLayout,
     vertex: { module, entryPoint: 'vertex' },
-    fragment: { module, entryPoint: 'fragment', targets: [{ format, blend }] },
+    fragment: { module, entryPoint: 'fragment', targets: [{ format, blend }], constants },
     primitive: { topology: 'triangle-list', cullMode: 'none' },
   });
 }

@@ -69,6 +69,9 @@ export interface AuxiliaryFrame {
   readonly survivors: GPUBuffer;
 }
 
+/** Textures of what else is in a frame. */
+export type DepthTexture = 'stored_depth' | 'median_depth' | 'layer_color' | 'second_depth' | 'second_color';
+
 /** What a frame has to do with depth besides its own. `SceneDepth` is one; pictures bring it, so that pages without it load none of its code. */
 export interface PaintingDepth {
   /** Called before a frame is recorded, with the pixels that are drawn. @throws GaussianSplatError for a frame that it does not fit */
@@ -81,8 +84,13 @@ export interface PaintingDepth {
   /** @param depths camera depths of the splats by slot */
   painter(depths: GPUBuffer): TilePainter;
   readonly quadsProgram: QuadsWithDepth;
+  /** Layers of color among the splats; 0 where the depth just ends pixels. */
+  readonly layers: number;
+  /** For quads: what blends a layer over the splats behind it. */
+  readonly layerProgram: Pick<ShaderProgram<ShaderDescription>, 'module' | 'pipelineLayout'>;
+  readonly layerBindings: GPUBindGroup;
   /** What a shader that has depth among other things binds, and its overrides. */
-  readonly resources: Readonly<Record<'scene', GPUBuffer> & Record<'stored_depth' | 'median_depth', GPUTextureView>>;
+  readonly resources: Readonly<Record<'scene', GPUBuffer> & Record<DepthTexture, GPUTextureView>>;
   readonly overrides: Overrides;
 }
 
