@@ -55,6 +55,43 @@ export function nearestFirst(splats: readonly ScreenSplat[]): ScreenSplat[] {
   return [...splats].sort((a, b) => a.key - b.key || a.index - b.index);
 }
 
+/** What else is in the picture, pixel by pixel: it lies among the splats by its depth. */
+export interface OracleLayer {
+  /** [height, width] depth in camera axes; Infinity where there is nothing. */
+  readonly depth: ArrayLike<number>;
+  /** [height, width, 4] premultiplied red, green, blue, and the share that is covered. */
+  readonly color: ArrayLike<number>;
+}
+
+/** Blends the layers of a pixel that are nearer than a depth. */
+class LayersAmong {
+  readonly #image: OracleImage;
+  readonly #layers: readonly OracleLayer[];
+  readonly #passed: Set<OracleLayer>[];
+
+  constructor(image: OracleImage, layers: readonly OracleLayer[]) {
+    this.#image = image;
+    this.#layers = layers;
+    this.#passed = layers.length === 0 ? [] : Array.from(image.transmittance, () => new Set<OracleLayer>());
+  }
+
+  passUpTo(pixel: number, depth: number): void {
+    const due = this.#layers.filter((layer) => layer.depth[pixel] < depth && !this.#passed[pixel].has(layer));
+    for (const layer of due.sort((a, b) => a.depth[pixel] - b.depth[pixel])) {
+      this.#passed[pixel].add(layer);
+      const { color, transmittance } = this.#image;
+      for (let k = 0; k < 3; k++) color[3 * pixel + k] += transmittance[pixel] * layer.color[4 * pixel + k];
+      transmittance[pixel] *= 1 - layer.color[4 * pixel + 3];
+    }
+  }
+
+  /** Those behind all splats. */
+  passAll(finished: ArrayLike<number>): void {
+    if (this.#layers.length === 0) return;
+    for (let pixel = 0; pixel < finished.length; pixel++) if (!finished[pixel]) this.passUpTo(pixel, Infinity);
+  }
+}
+
 /**
  * Blends splats, nearest first, into the image, pixel by pixel: C += T·alpha·c, then T *= 1 - alpha.
  * @param limit [height, width] depth of what else is in the picture: splats behind it are hidden
@@ -64,9 +101,12 @@ export function blend(
   splats: readonly ScreenSplat[],
   rules: Rules,
   limit?: ArrayLike<number>,
+  layers: readonly OracleLayer[] = [],
 ): void {
   const finished = new Uint8Array(image.width * image.height);
-  for (const splat of splats) blendSplat(image, finished, splat, rules, limit);
+  const among = new LayersAmong(image, layers);
+  for (const splat of splats) blendSplat(image, finished, splat, rules, limit, among);
+  among.passAll(finished);
 }
 
 /** What one pixel takes. */
@@ -85,7 +125,9 @@ export function blendByPixel(
   splats: readonly ScreenSplat[],
   rules: Rules,
   limit?: ArrayLike<number>,
+  layers: readonly OracleLayer[] = [],
 ): void {
+  const among = new LayersAmong(image, layers);
   const rows: ScreenSplat[][] = Array.from({ length: image.height }, () => []);
   for (const splat of splats) {
     for (let row = splat.footprint.top; row < splat.footprint.bottom; row++) rows[row].push(splat);
@@ -105,9 +147,13 @@ export function blendByPixel(
     for (const [column, found] of fragments.entries()) {
       const pixel = row * image.width + column;
       found.sort((a, b) => a.depth - b.depth);
-      for (const { splat, alpha, depth } of found) blendFragment(image, finished, pixel, splat, alpha, depth, rules);
+      for (const { splat, alpha, depth } of found) {
+        if (!finished[pixel]) among.passUpTo(pixel, depth);
+        blendFragment(image, finished, pixel, splat, alpha, depth, rules);
+      }
     }
   }
+  among.passAll(finished);
 }
 
 function blendSplat(
@@ -116,6 +162,7 @@ function blendSplat(
   splat: ScreenSplat,
   rules: Rules,
   limit: ArrayLike<number> | undefined,
+  among: LayersAmong,
 ): void {
   const { width } = image;
   const { footprint } = splat;
@@ -125,7 +172,9 @@ function blendSplat(
       const pixel = row * width + column;
       if (finished[pixel] || (limit && splat.depth > limit[pixel])) continue;
       const alpha = alphaAt(splat, column, row, rules, hopeless);
-      if (alpha > 0) blendFragment(image, finished, pixel, splat, alpha, splat.depth, rules);
+      if (alpha === 0) continue;
+      among.passUpTo(pixel, splat.depth);
+      blendFragment(image, finished, pixel, splat, alpha, splat.depth, rules);
     }
   }
 }

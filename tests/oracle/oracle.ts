@@ -23,6 +23,7 @@ import {
   emptyImage,
   nearestFirst,
   type OracleImage,
+  type OracleLayer,
   type ScreenSplat,
 } from './blend.js';
 import { densestDepth } from './densest.js';
@@ -42,6 +43,8 @@ export interface OracleOptions {
   readonly background?: Vector3;
   /** [height, width] depth of what else is in the picture, world units in camera axes: splats behind it are hidden. */
   readonly depth?: ArrayLike<number>;
+  /** Layers of color among the splats. */
+  readonly layers?: readonly OracleLayer[];
   /** [N] one key for each splat of the cloud, blended ascending; default float32 z in camera axes. */
   readonly depthKeys?: ArrayLike<number>;
   /** `pixel`: each pixel blends by where along its ray each splat is densest, whatever the keys say. Default `center`. */
@@ -60,7 +63,7 @@ export function renderOracle(cloud: GaussianCloud, camera: Camera, options: Orac
 
   const image = emptyImage(camera.width, camera.height, cloud.count);
   const splats = screenSplats(cloud, camera, rules, options);
-  blenderOf(options)(image, nearestFirst(splats), rules, options.depth);
+  blenderOf(options)(image, nearestFirst(splats), rules, options.depth, options.layers);
   if (options.background) addBackground(image, options.background);
   return image;
 }
@@ -80,7 +83,7 @@ export interface PlacedCloud {
 export function renderOracleWorld(
   placed: readonly PlacedCloud[],
   camera: Camera,
-  options: Pick<OracleOptions, 'rules' | 'depth' | 'background' | 'order'>,
+  options: Pick<OracleOptions, 'rules' | 'depth' | 'layers' | 'background' | 'order'>,
 ): OracleImage {
   const rules = typeof options.rules === 'string' ? RULES[options.rules] : options.rules;
   let first = 0;
@@ -95,7 +98,7 @@ export function renderOracleWorld(
     return all.filter(({ index }) => faded.opacities[index] > 0).map((s) => ({ ...s, index: start + s.index }));
   });
   const image = emptyImage(camera.width, camera.height, first);
-  blenderOf(options)(image, nearestFirst(splats), rules, options.depth);
+  blenderOf(options)(image, nearestFirst(splats), rules, options.depth, options.layers);
   if (options.background) addBackground(image, options.background);
   return image;
 }

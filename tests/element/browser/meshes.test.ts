@@ -76,6 +76,47 @@ describe('meshes', () => {
     assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METRE, 50)), 'turned to its edge');
   });
 
+  it('are layers of the picture: edges show the splats behind them, and so does glass', async () => {
+    const element = place();
+    const ball = document.createElement('splat-scene') as SplatSceneElement;
+    ball.setAttribute('src', GREEN);
+    ball.setAttribute('scale', '40');
+    const black = mesh(
+      { surface: 'unlit', colour: [0, 0, 0], half: [0.6, 0.6, 0.1] },
+      { position: '-0.9 0 3', rotation: '0 0 17deg' },
+    );
+    const before = mesh(
+      { surface: 'unlit', colour: [1, 0, 0], alpha: 0.5, half: [0.3, 0.3, 0.05] },
+      { position: '0.9 0.5 3' },
+    );
+    const behind = mesh(
+      { surface: 'unlit', colour: [1, 0, 0], alpha: 0.5, half: [0.3, 0.3, 0.05] },
+      { position: '0.9 -0.5 -6' },
+    );
+    element.append(ball, black, before, behind);
+    await until(() => [ball, black, before, behind].every(({ loaded }) => loaded), 'all');
+    await frames();
+    const screen = await screenOf(element);
+    const near = (x: number, y: number): Rgb => screen.at(60 + (x * METRE * 10) / 7, 50 - (y * METRE * 10) / 7);
+    const green = screen.at(60, 50);
+    assert(isGreen(green), `the ball: ${green.join()}`);
+    assert(Math.max(...near(-0.9, 0)) <= 1, `the black box: ${near(-0.9, 0).join()}`);
+    // Nothing but black and the green behind is in the edges: no page.
+    for (let x = -1.9; x < 0; x += 0.02)
+      for (let y = -0.7; y < 0.7; y += 0.02) {
+        const found = near(x, y);
+        assert(found[0] <= green[0] + 12 && found[2] <= green[2] + 12, `at ${x}, ${y}: ${found.join()}`);
+      }
+    const through = near(0.9, 0.5);
+    const mixed = [0, 1, 2].map((k) => 0.5 * green[k] + (k === 0 ? 127.5 : 0));
+    assert(
+      through.every((value, k) => Math.abs(value - mixed[k]) <= 14),
+      `through glass: ${through.join()} for ${mixed.join()}`,
+    );
+    const hidden = screen.at(60 + (0.9 * METRE * 10) / 16, 50 + (0.5 * METRE * 10) / 16);
+    assert(hidden[0] <= green[0] + 12, `glass behind the ball: ${hidden.join()}`);
+  });
+
   it('without light keep their base colors, and lit by even light nearly so', async () => {
     const greys = [0, 0.02, 0.1, 0.214, 0.5, 1];
     const shown = [0, 39, 89, 127, 188, 255];

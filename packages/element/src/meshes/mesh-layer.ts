@@ -19,20 +19,31 @@ import { matrixOfFrame, transposed } from '../composition/placing.js';
 import type { PlacedModel } from './meshes.js';
 import type { Model } from './model.js';
 import { MeshResolve } from './mesh-resolve.js';
-import { light, showAsDisplayed } from './shown-colors.js';
+import { light, showAsDisplayed, showThrough } from './shown-colors.js';
 
 /** Samples of a pixel. */
 const SAMPLES = 4;
 
-/** Draws meshes with three.js on the element's device, into the frame and a depth texture that splats end at. */
+/** Kinds of triangles, drawn one after the other. */
+const [OPAQUE, TRANSPARENT] = [0, 1];
+
+/** A texture of three.js's, with the depths of its samples and one depth a pixel. */
+interface Drawn {
+  readonly color: GPUTexture;
+  readonly texture: GPUTexture;
+}
+
+/** Draws meshes with three.js on the element's device, as layers of color and depth that splats are painted among. */
 export class MeshLayer {
   readonly device: GPUDevice;
   readonly #renderer: WebGPURenderer;
   readonly #scene = new Scene();
   readonly #camera = new ThreeCamera();
   readonly #target = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
+  /** What is transparent, behind nothing that is opaque: it has the depth of that, too. */
+  readonly #glass = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
   readonly #resolve: MeshResolve;
-  #depth: { readonly texture: GPUTexture; readonly ofSplats: SceneDepth } | undefined;
+  #depth: { readonly key: readonly unknown[]; readonly ofSplats: SceneDepth } | undefined;
   /** Near plane of the last frame. */
   #near = 1;
   readonly #shown = new Map<Model, Group>();
@@ -44,6 +55,7 @@ export class MeshLayer {
     this.#renderer = renderer;
     this.#resolve = new MeshResolve(device);
     this.#target.depthTexture = new DepthTexture(1, 1, FloatType);
+    this.#glass.depthTexture = this.#target.depthTexture;
     this.#camera.matrixAutoUpdate = false;
     this.#camera.coordinateSystem = WebGPUCoordinateSystem;
     this.#camera._reversedDepth = true;
@@ -65,24 +77,30 @@ export class MeshLayer {
     return new MeshLayer(device, renderer);
   }
 
-  draw(
-    { camera, target, background }: Frame,
-    models: readonly PlacedModel[],
-    world: ViewerFrame,
-  ): Partial<FrameTarget> {
+  draw({ camera }: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<FrameTarget> {
     this.#arrange(models, world);
     this.#look(camera, world);
     const { width, height } = camera;
     const size = `${width} x ${height}`;
-    if (size !== this.#size) this.#target.setSize(width, height);
+    if (size !== this.#size) for (const target of [this.#target, this.#glass]) target.setSize(width, height);
     this.#size = size;
-    this.#renderer.setRenderTarget(this.#target);
-    this.#renderer.render(this.#scene, this.#camera);
-    const { backend } = this.#renderer;
-    const color = backend.get(this.#target.texture).texture!;
-    const depth = backend.get(this.#target.depthTexture!).texture!;
     this.#near = camera.near;
-    return { over: 'target', depth: this.#depthFor(this.#resolve.run(color, depth, target, background)) };
+    const opaque = this.#drawKind(OPAQUE, this.#target);
+    const hasGlass = models.some(({ model }) => (model as Model).materials.some(({ transparent }) => transparent));
+    const glass = hasGlass ? this.#drawKind(TRANSPARENT, this.#glass) : undefined;
+    return { depth: this.#depthFor(opaque, glass) };
+  }
+
+  /** Draws the triangles of a kind. What is transparent comes second, and is hidden by what is opaque. */
+  #drawKind(kind: number, target: RenderTarget): Drawn {
+    const renderer = this.#renderer;
+    this.#camera.layers.set(kind);
+    renderer.autoClearDepth = kind === OPAQUE;
+    renderer.setRenderTarget(target);
+    renderer.render(this.#scene, this.#camera);
+    const color = renderer.backend.get(target.texture).texture!;
+    const samples = renderer.backend.get(target.depthTexture!).texture!;
+    return { color, texture: this.#resolve.run(kind, samples) };
   }
 
   /** Ends what was found of splats where a mesh is nearer. */
@@ -105,17 +123,19 @@ export class MeshLayer {
     this.#environment?.dispose();
     this.#target.depthTexture?.dispose();
     this.#target.dispose();
+    this.#glass.dispose();
     this.#resolve.destroy();
     this.#depth?.ofSplats.destroy();
     void this.#renderer.dispose();
   }
 
-  /** Bound once for the same texture. */
-  #depthFor(texture: GPUTexture): SceneDepth {
-    if (this.#depth?.texture !== texture) {
+  /** Bound once for the same textures. */
+  #depthFor(opaque: Drawn, second: Drawn | undefined): SceneDepth {
+    const key = [opaque.color, opaque.texture, second?.color, second?.texture];
+    if (!this.#depth?.key.every((value, i) => value === key[i])) {
       this.#depth?.ofSplats.destroy();
-      const ofSplats = new SceneDepth(this.device, { host: { texture, reversed: true, far: Infinity } });
-      this.#depth = { texture, ofSplats };
+      const ofSplats = new SceneDepth(this.device, { host: { ...opaque, second, reversed: true, far: Infinity } });
+      this.#depth = { key, ofSplats };
     }
     return this.#depth.ofSplats;
   }
@@ -141,7 +161,18 @@ export class MeshLayer {
   #show(model: Model): void {
     this.#shown.set(model, model.root);
     this.#scene.add(model.root);
-    model.materials.forEach(showAsDisplayed);
+    model.root.traverse((object) => object.layers.enableAll());
+    model.forEachMesh((mesh, materials) => {
+      materials.forEach(showThrough);
+      materials.forEach(showAsDisplayed);
+      const isGlass = materials.some(({ transparent }) => transparent);
+      mesh.layers.set(isGlass ? TRANSPARENT : OPAQUE);
+      // Splats lie before it or behind it.
+      for (const material of isGlass ? materials : []) {
+        material.depthWrite = true;
+        material.alphaTest = 1 / 255;
+      }
+    });
     if (model.hasLights) return;
     const { texture } = (this.#environment ??= this.#makeEnvironment());
     for (const material of model.materials) light(material, texture);

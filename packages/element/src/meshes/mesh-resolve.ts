@@ -1,27 +1,20 @@
-/** From what three.js has drawn, with several samples a pixel, to the frame and one depth a pixel. */
-import type { Rgba } from '@gaussian-splat/renderer';
-
-/** Premultiplied colours over what is there. */
-const OVER: GPUBlendComponent = { srcFactor: 'one', dstFactor: 'one-minus-src-alpha' };
+/** From the depths of several samples a pixel, as three.js has drawn them, to one depth a pixel. */
 
 const SHADER = /* wgsl */ `
-@group(0) @binding(0) var drawn: texture_2d<f32>;
-@group(0) @binding(1) var depths: texture_depth_multisampled_2d;
-
-struct Resolved {
-  @location(0) color: vec4f,
-  @builtin(frag_depth) depth: f32,
-}
+@group(0) @binding(0) var samples: texture_depth_multisampled_2d;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
   return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
+// The nearest of the samples: where one of them meets a mesh, the pixel has its layer.
 @fragment
-fn fragment(@builtin(position) position: vec4f) -> Resolved {
+fn fragment(@builtin(position) position: vec4f) -> @builtin(frag_depth) f32 {
   let pixel = vec2u(position.xy);
-  return Resolved(textureLoad(drawn, pixel, 0), textureLoad(depths, pixel, 0));
+  var nearest = 0.0;
+  for (var i = 0u; i < textureNumSamples(samples); i++) { nearest = max(nearest, textureLoad(samples, pixel, i)); }
+  return nearest;
 }
 `;
 
@@ -37,67 +30,57 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 `;
 
-interface Bound {
-  readonly color: GPUTexture;
-  readonly depth: GPUTexture;
-  readonly group: GPUBindGroup;
-}
-
 export class MeshResolve {
   readonly #device: GPUDevice;
-  readonly #module: GPUShaderModule;
-  readonly #layout: GPUBindGroupLayout;
-  readonly #pipelines = new Map<GPUTextureFormat, GPURenderPipeline>();
-  #depth: GPUTexture | undefined;
-  #bound: Bound | undefined;
+  readonly #pipeline: GPURenderPipeline;
+  /** By kind of triangles: the depths of the samples, and those of the pixels. */
+  readonly #resolved: { samples: GPUTexture; depth: GPUTexture; group: GPUBindGroup }[] = [];
 
   constructor(device: GPUDevice) {
     this.#device = device;
-    this.#module = device.createShaderModule({ label: 'gs.mesh_resolve', code: SHADER });
-    const visibility = GPUShaderStage.FRAGMENT;
-    this.#layout = device.createBindGroupLayout({
+    const module = device.createShaderModule({ label: 'gs.mesh_resolve', code: SHADER });
+    this.#pipeline = device.createRenderPipeline({
       label: 'gs.mesh_resolve',
-      entries: [
-        { binding: 0, visibility, texture: { sampleType: 'unfilterable-float' } },
-        { binding: 1, visibility, texture: { sampleType: 'depth', multisampled: true } },
-      ],
+      layout: 'auto',
+      vertex: { module },
+      fragment: { module, targets: [] },
+      depthStencil: { format: 'depth32float', depthWriteEnabled: true, depthCompare: 'always' },
     });
   }
 
-  /** Of the last frame: `near / z`, 0 where there is nothing. */
+  /** Of the first kind in the last frame: `near / z`, 0 where there is nothing. */
   get depth(): GPUTexture | undefined {
-    return this.#depth;
+    return this.#resolved[0]?.depth;
   }
 
   /**
-   * @param background what is behind the meshes, premultiplied
+   * @param kind of triangles, from 0 on
    * @returns the depth of the frame; the same texture while its size is
    */
-  run(color: GPUTexture, depth: GPUTexture, target: GPUTexture, background: Rgba = [0, 0, 0, 0]): GPUTexture {
-    const own = this.#depthOf(target);
-    if (this.#bound?.color !== color || this.#bound.depth !== depth) this.#bound = this.#bind(color, depth);
+  run(kind: number, samples: GPUTexture): GPUTexture {
+    const { depth, group } = this.#resolvedOf(kind, samples);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.mesh_resolve' });
     const pass = encoder.beginRenderPass({
       label: 'gs.mesh_resolve',
-      colorAttachments: [{ view: target.createView(), loadOp: 'clear', clearValue: [...background], storeOp: 'store' }],
+      colorAttachments: [],
       depthStencilAttachment: {
-        view: own.createView(),
+        view: depth.createView(),
         depthLoadOp: 'clear',
         depthClearValue: 0,
         depthStoreOp: 'store',
       },
     });
-    pass.setPipeline(this.#pipelineFor(target.format));
-    pass.setBindGroup(0, this.#bound.group);
+    pass.setPipeline(this.#pipeline);
+    pass.setBindGroup(0, group);
     pass.draw(3);
     pass.end();
     this.#device.queue.submit([encoder.finish()]);
-    return own;
+    return depth;
   }
 
   /** Stored depths at pixels of the last frame; 0 where there is nothing. Reads back from the GPU: for clicks and labels. */
   async read(pixels: readonly (readonly [number, number])[]): Promise<Float32Array> {
-    const depth = this.#depth;
+    const { depth } = this;
     if (depth === undefined || pixels.length === 0) return new Float32Array(pixels.length);
     const device = this.#device;
     const { STORAGE, COPY_DST, COPY_SRC, MAP_READ } = GPUBufferUsage;
@@ -135,42 +118,27 @@ export class MeshResolve {
   }
 
   destroy(): void {
-    this.#depth?.destroy();
-    this.#depth = undefined;
+    for (const { depth } of this.#resolved.splice(0)) depth.destroy();
   }
 
-  #depthOf({ width, height }: GPUTexture): GPUTexture {
-    if (this.#depth?.width === width && this.#depth.height === height) return this.#depth;
-    this.#depth?.destroy();
+  #resolvedOf(kind: number, samples: GPUTexture): { depth: GPUTexture; group: GPUBindGroup } {
+    const known = this.#resolved[kind];
+    if (known?.samples === samples) return known;
+    known?.depth.destroy();
     const { RENDER_ATTACHMENT, TEXTURE_BINDING } = GPUTextureUsage;
-    return (this.#depth = this.#device.createTexture({
+    const depth = this.#device.createTexture({
       label: 'gs.mesh_resolve.depth',
-      size: [width, height],
+      size: [samples.width, samples.height],
       format: 'depth32float',
       usage: RENDER_ATTACHMENT | TEXTURE_BINDING,
-    }));
-  }
-
-  #bind(color: GPUTexture, depth: GPUTexture): Bound {
+    });
     const group = this.#device.createBindGroup({
       label: 'gs.mesh_resolve',
-      layout: this.#layout,
-      entries: [color, depth].map((texture, binding) => ({ binding, resource: texture.createView() })),
+      layout: this.#pipeline.getBindGroupLayout(0),
+      entries: [{ binding: 0, resource: samples.createView() }],
     });
-    return { color, depth, group };
-  }
-
-  #pipelineFor(format: GPUTextureFormat): GPURenderPipeline {
-    const known = this.#pipelines.get(format);
-    if (known) return known;
-    const pipeline = this.#device.createRenderPipeline({
-      label: 'gs.mesh_resolve',
-      layout: this.#device.createPipelineLayout({ bindGroupLayouts: [this.#layout] }),
-      vertex: { module: this.#module },
-      fragment: { module: this.#module, targets: [{ format, blend: { color: OVER, alpha: OVER } }] },
-      depthStencil: { format: 'depth32float', depthWriteEnabled: true, depthCompare: 'always' },
-    });
-    this.#pipelines.set(format, pipeline);
-    return pipeline;
+    const made = { samples, depth, group };
+    this.#resolved[kind] = made;
+    return made;
   }
 }

@@ -98,6 +98,11 @@ export class Model {
     this.version++;
   }
 
+  /** Calls back with each mesh and its materials. */
+  forEachMesh(callback: (mesh: Mesh, materials: readonly Material[]) => void): void {
+    for (const mesh of this.#meshes) callback(mesh, [mesh.material].flat());
+  }
+
   get materials(): readonly Material[] {
     return this.#meshes.flatMap(({ material }) => material);
   }

@@ -10,6 +10,16 @@ export function showAsDisplayed(material: Material): void {
   material.outputNode = vec4(sRGBTransferOETF(light.clamp(0, 1)), output.a);
 }
 
+/**
+ * Glass lets through what is behind it, splats among it: to a share, as `alphaMode: BLEND` has it. What is behind keeps its color: a layer has one alpha for red, green and blue.
+ */
+export function showThrough(material: Material): void {
+  if (!material.transmission) return;
+  material.opacity *= 1 - material.transmission;
+  material.transmission = 0;
+  material.transparent = true;
+}
+
 /** Lights a material from all around. An unlit one has an `envMap`, too, of mirrors. */
 export function light(material: Material, environment: Texture): void {
   if (material.isMeshBasicMaterial || !('envMap' in material)) return;

@@ -19,6 +19,11 @@ export class Box3 {
   setFromObject(object: Object3D, precise?: boolean): this;
   isEmpty(): boolean;
 }
+/** Which of 32 kinds an object is of, or a camera sees. */
+export class Layers {
+  set(kind: number): void;
+  enableAll(): void;
+}
 export class Object3D {
   name: string;
   visible: boolean;
@@ -26,6 +31,7 @@ export class Object3D {
   matrixWorld: Matrix4;
   matrixAutoUpdate: boolean;
   frustumCulled: boolean;
+  readonly layers: Layers;
   add(...objects: Object3D[]): this;
   remove(...objects: Object3D[]): this;
   traverse(callback: (object: Object3D) => void): void;
@@ -73,6 +79,12 @@ export class Material {
   envMapIntensity?: number;
   /** What is written in place of {@link output}. */
   outputNode?: ShaderNode;
+  transparent: boolean;
+  opacity: number;
+  depthWrite: boolean;
+  alphaTest: number;
+  /** Of glTF's `KHR_materials_transmission`. */
+  transmission?: number;
   dispose(): void;
 }
 export interface Attribute {
@@ -119,6 +131,7 @@ export class WebGPURenderer {
   init(): Promise<unknown>;
   setRenderTarget(target: RenderTarget | null): void;
   setClearColor(color: number, alpha: number): void;
+  autoClearDepth: boolean;
   render(scene: Scene, camera: Camera): void;
   compileAsync(scene: Scene, camera: Camera): Promise<unknown>;
   dispose(): unknown;

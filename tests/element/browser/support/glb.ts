@@ -32,6 +32,8 @@ export interface BoxOptions {
   readonly colour?: readonly [number, number, number];
   /** How its color is meant: it shines (the default), is its base color whatever light there is, or reflects light as a rough surface does. */
   readonly surface?: 'shining' | 'unlit' | 'rough';
+  /** It lets through what is behind it. */
+  readonly alpha?: number;
   /** It moves by so much along x within a second. */
   readonly moves?: number;
   /** A splat besides, at this place. */
@@ -43,6 +45,7 @@ export function boxGlb({
   half = [0.5, 0.5, 0.5],
   colour = [1, 0, 0],
   surface = 'shining',
+  alpha = 1,
   moves,
   splat,
 }: BoxOptions = {}): File {
@@ -86,7 +89,7 @@ export function boxGlb({
     scenes: [{ nodes: [0] }],
     nodes: [{ mesh: 0 }],
     meshes: [{ primitives }],
-    materials: [material(surface, colour)],
+    materials: [material(surface, colour, alpha)],
     extensionsUsed: ['KHR_materials_unlit', ...(splat ? ['KHR_gaussian_splatting'] : [])],
     ...(animations.length > 0 && { animations }),
     accessors,
@@ -96,10 +99,11 @@ export function boxGlb({
   return new File([glb(json, parts)], 'box.glb');
 }
 
-function material(surface: 'shining' | 'unlit' | 'rough', colour: readonly number[]): object {
+function material(surface: 'shining' | 'unlit' | 'rough', colour: readonly number[], alpha: number): object {
   const base = surface === 'shining' ? [0, 0, 0] : colour;
   return {
-    pbrMetallicRoughness: { baseColorFactor: [...base, 1], metallicFactor: 0 },
+    pbrMetallicRoughness: { baseColorFactor: [...base, alpha], metallicFactor: 0 },
+    ...(alpha < 1 && { alphaMode: 'BLEND' }),
     ...(surface === 'shining' && { emissiveFactor: colour }),
     ...(surface === 'unlit' && { extensions: { KHR_materials_unlit: {} } }),
   };
