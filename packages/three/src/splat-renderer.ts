@@ -206,8 +206,8 @@ function quadOf(colors: NodeMaterial['fragmentNode']): Quad {
   return { material, quad: new QuadMesh(material) };
 }
 
-function pictureOf(depthTexture?: DepthTexture): Picture {
-  const target = new RenderTarget(1, 1, { type: HalfFloatType, depthTexture, depthBuffer: depthTexture !== undefined });
+function pictureOf(depthTexture: DepthTexture | null = null): Picture {
+  const target = new RenderTarget(1, 1, { type: HalfFloatType, depthTexture, depthBuffer: depthTexture !== null });
   return { target, copy: quadOf(texture(target.texture)) };
 }
 
