@@ -7,7 +7,7 @@ const MAY_IMPORT = {
   core: [],
   formats: ['core'],
   renderer: ['core'],
-  generator: ['core'],
+  generator: ['core', 'renderer'],
   check: ['core', 'generator'],
   economise: ['core', 'formats', 'renderer'],
   element: ['core', 'formats', 'generator', 'renderer'],

@@ -4,6 +4,9 @@ import { format } from 'prettier';
 import { root } from './lib/run.mjs';
 
 const { CONTRACT_SCHEMA } = await import('../packages/core/dist/contract/index.js');
-const path = `${root}packages/core/contract.schema.json`;
-writeFileSync(path, await format(JSON.stringify(CONTRACT_SCHEMA), { parser: 'json', printWidth: 120 }));
-console.log(`wrote ${path}`);
+const text = await format(JSON.stringify(CONTRACT_SCHEMA), { parser: 'json', printWidth: 120 });
+// The exporter checks contracts by the same one.
+for (const path of ['core/contract.schema.json', 'exporter/src/gaussian_exporter/contract_schema.json']) {
+  writeFileSync(`${root}packages/${path}`, text);
+  console.log(`wrote ${path}`);
+}

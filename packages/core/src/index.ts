@@ -6,4 +6,5 @@ export * from './half.js';
 export * from './linear.js';
 export * from './load-module.js';
 export * from './part-request.js';
+export * from './scene-host.js';
 export * from './vector.js';

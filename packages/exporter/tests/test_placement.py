@@ -45,7 +45,7 @@ def found(model: onnx.ModelProto) -> set[tuple[str, str]]:
 @pytest.mark.parametrize("name", list(every_family()))
 def test_every_family_stays_on_the_gpu(name: str) -> None:
     model, _ = every_family()[name]
-    assert [str(finding) for finding in gpu_findings(model)] == []
+    assert [str(finding) for finding in gpu_findings(model) if finding.kind != "inexact"] == []
 
 
 def test_outputs_that_a_recording_would_lose_are_named() -> None:

@@ -4,6 +4,7 @@ against the same file."""
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,12 @@ def test_what_is_wrong_with_what_a_run_wrote(case: Any) -> None:
     contract = case | {"outputs": base["outputs"] | case.get("outputs", {})}
     found = faults_of(contract, {name: tensor(**given) for name, given in tensors.items() if given})
     assert sorted({f"{fault.code} {fault.tensor}" for fault in found}) == case["faults"]
+
+
+@pytest.mark.parametrize(("name", "codes"), json.loads((FIXTURES / "verdicts.json").read_text()).items())
+def test_both_checkers_say_the_same(name: str, codes: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(FIXTURES / "verdicts" / name)]) == (1 if codes else 0)
+    assert sorted(set(re.findall(r"\[(contract/[a-z-]+)\]", capsys.readouterr().err))) == codes
 
 
 @pytest.mark.parametrize("name", ["packed", "split", "instances", "state", "frames"])

@@ -40,7 +40,7 @@ function numbersOf(
   state: GeneratorState,
 ): ArrayLike<number> {
   const { timeSeconds = 0 } = state;
-  const camera = (): Camera => state.camera ?? needCamera(input.name, binding.role);
+  const camera = (): Camera => requireCamera(state.camera, input.name, binding.role);
   switch (binding.role) {
     case 'view':
       return inOrder(viewMatrix(camera(), binding.axes ?? 'RDF'), binding.order ?? 'row-major');
@@ -108,12 +108,16 @@ function toTensor(input: OnnxTensor, numbers: ArrayLike<number>): InputNumbers {
   throw wrong(name, 'an input of float32, int32 or int64', dtype);
 }
 
-function needCamera(name: string, role: string): never {
+function requireCamera(camera: Camera | undefined, name: string, role: string): Camera {
+  if (camera?.worldToCamera?.length === 16) return camera;
+  const isThree = (camera as { isCamera?: boolean } | undefined)?.isCamera === true;
   throw new GaussianSplatError('argument/value', {
     where: `input ${name} (${role})`,
-    expected: 'a camera in the state of the generator',
-    found: 'none',
-    remedy: 'set camera before the generator runs',
+    expected: 'a camera of @gaussian-splat/core in the state of the generator',
+    found: camera === undefined ? 'none' : isThree ? 'a camera of three.js' : 'an object without worldToCamera',
+    remedy: isThree
+      ? 'give the state that SplatRenderer.stateOf(camera, model) of @gaussian-splat/three returns'
+      : 'set camera before the generator runs; cameraFromProjection makes one of two matrices',
   });
 }
 

@@ -1,7 +1,9 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { ContractError, type Contract, type GaussianLayout } from '@gaussian-splat/core/contract';
+import type { DynamicGaussians, Placed, Placement, World } from '@gaussian-splat/renderer';
 import { Generator, type GaussianSink, type GeneratedFrame, type GeneratorOptions } from './generator.js';
 import type { ModelSource } from './runtime/open-model.js';
+import { receiveGaussians, type ThreeScene } from './scene-hosts.js';
 import type { GeneratorState } from './state.js';
 
 /** Makes what the Gaussians of a model are written into, for example `DynamicGaussians.create(device, layout)`. */
@@ -9,14 +11,27 @@ export type MakeSink<S extends GaussianSink> = (layout: GaussianLayout, contract
 
 /** A model in the scene. */
 export interface GaussianModel<S extends GaussianSink = GaussianSink> {
+  /** The name that its generator is registered with. */
+  readonly name: string;
   readonly generator: Generator;
   /** What is drawn. */
   readonly gaussians: S;
   /** State of this model alone, on top of what `runGenerators` is given. */
   state: GeneratorState;
-  /** Takes it out of the scene. The sink belongs to its maker. */
+  /** Where it stands in a `World`; undefined elsewhere. */
+  readonly placement: Placement | undefined;
+  /** Takes it out of the scene. A sink that the page made belongs to the page; one that was made for a scene is destroyed. */
   remove(): void;
 }
+
+/** Where a model goes: a world, a scene of three.js, or what makes a sink. */
+export type GaussianModelScene<S extends GaussianSink = GaussianSink> = World | ThreeScene | MakeSink<S>;
+
+/** Gives the inputs of a model for the next run, or nothing to leave them as they are. */
+export type FrameUpdate = (state: GeneratorState, model: GaussianModel) => GeneratorState | undefined | void;
+
+/** The Gaussians of a model, with what only those in a scene have. */
+type Hosted = Pick<GaussianModel, 'gaussians'> & Partial<Pick<GaussianModel, 'placement' | 'remove'>>;
 
 /** A generator by its name. */
 interface Registered {
@@ -28,6 +43,7 @@ interface Registered {
 export class GaussianModels {
   readonly #sources = new Map<string, Registered>();
   readonly #models = new Set<GaussianModel>();
+  readonly #updates = new Set<FrameUpdate>();
   readonly #listeners = new Set<(model: GaussianModel, frame: GeneratedFrame) => void>();
   readonly #failures = new Set<(model: GaussianModel | undefined, error: unknown) => void>();
   /** Generators by name, on their way or there. */
@@ -65,42 +81,80 @@ export class GaussianModels {
   }
 
   /**
-   * Puts a model into the scene. Models of one generator share its session.
-   * @throws GaussianSplatError `argument/value` for a name that is not registered, or before {@link loadAllGenerators}; what `makeSink` throws;
-   * an `AbortError` if {@link clear} is called meanwhile: a sink that `makeSink` has made then stays with its maker.
+   * Puts a model into a scene. Models of one generator share its session.
+   *
+   * ```ts
+   * await models.addGaussianModelToScene('ball', world, { sceneToWorld }); // drawn by each Viewpoint of the world
+   * await models.addGaussianModelToScene('ball', scene); // of three.js, drawn by a SplatRenderer
+   * await models.addGaussianModelToScene('ball', (layout) => DynamicGaussians.create(device, layout)); // a sink of your own
+   * ```
+   * @param placed how it stands in a world.
+   * @throws GaussianSplatError `argument/value` for a name that is not registered, before {@link loadAllGenerators}, or for a scene that no
+   * renderer draws; what `makeSink` throws; an `AbortError` if {@link clear} is called meanwhile: a sink that `makeSink` has made then stays
+   * with its maker.
    */
-  async addGaussianModelToScene<S extends GaussianSink>(
+  async addGaussianModelToScene(
     name: string,
-    makeSink: MakeSink<S>,
-  ): Promise<GaussianModel<S>> {
-    if (this.#device === undefined) throw unknownGenerator(name, [...this.#sources.keys()]);
+    world: World,
+    placed?: Omit<Placed, 'scene'>,
+  ): Promise<GaussianModel<DynamicGaussians> & { readonly placement: Placement }>;
+  async addGaussianModelToScene(name: string, scene: ThreeScene): Promise<GaussianModel>;
+  async addGaussianModelToScene<S extends GaussianSink>(name: string, makeSink: MakeSink<S>): Promise<GaussianModel<S>>;
+  async addGaussianModelToScene(
+    name: string,
+    scene: GaussianModelScene,
+    placed?: Omit<Placed, 'scene'>,
+  ): Promise<GaussianModel> {
+    const device = this.#device;
+    if (device === undefined) throw unknownGenerator(name, [...this.#sources.keys()]);
     const { signal } = this.#cleared;
-    const generator = await this.#open(name, this.#device, {
+    const generator = await this.#open(name, device, {
       signal,
       onFrame: (frame) => this.#listeners.forEach((listener) => listener(model, frame)),
       onError: (error) => this.#failures.forEach((listener) => listener(model, error)),
     });
     const { layout, contract } = generator.model;
-    let gaussians: S;
+    let hosted: Hosted;
     try {
-      gaussians = await makeSink(layout, contract);
-      signal.throwIfAborted();
+      hosted =
+        typeof scene === 'function'
+          ? { gaussians: await scene(layout, contract) }
+          : await receiveGaussians(scene, device, layout, placed);
     } catch (error) {
       generator.close();
       throw error;
     }
-    generator.sink = gaussians;
+    const { gaussians, placement } = hosted;
     const remove = (): void => {
       this.#models.delete(model);
       generator.close();
+      hosted.remove?.();
     };
-    const model: GaussianModel<S> = { generator, gaussians, state: {}, remove };
+    const model: GaussianModel = { name, generator, gaussians, placement, state: {}, remove };
+    if (signal.aborted) {
+      remove();
+      throw signal.reason;
+    }
+    generator.sink = gaussians;
     this.#models.add(model);
     return model;
   }
 
-  /** Listens to every new frame of every model, and to runs that fail. @returns what ends it. */
-  onFrame(
+  /**
+   * Calls `update` before each run of each model. What it returns is laid over the state that {@link runGenerators} was given.
+   *
+   * ```ts
+   * models.onFrame(({ timeSeconds = 0 }) => ({ controls: { swing: Math.sin(timeSeconds) } }));
+   * ```
+   * @returns what ends it.
+   */
+  onFrame(update: FrameUpdate): () => void {
+    this.#updates.add(update);
+    return () => this.#updates.delete(update);
+  }
+
+  /** Calls `listener` with each finished run of each model, and `onError` with runs that fail. @returns what ends it. */
+  onGenerated(
     listener: (model: GaussianModel, frame: GeneratedFrame) => void,
     onError?: (model: GaussianModel | undefined, error: unknown) => void,
   ): () => void {
@@ -113,11 +167,17 @@ export class GaussianModels {
   }
 
   /**
-   * Asks all models for the Gaussians of a state; each model's own `state` counts above it. Returns at once.
+   * Asks all models for the Gaussians of a state, laid over by what the callbacks of {@link onFrame} return, and by each model's own `state`.
+   * Returns at once.
    * @throws GaussianSplatError `argument/value` if a state does not fit a contract.
    */
-  runGenerators(state: GeneratorState): void {
-    for (const model of this.#models) model.generator.request({ ...state, ...model.state });
+  runGenerators(state: GeneratorState = {}): void {
+    for (const model of this.#models) {
+      let asked = state;
+      for (const update of this.#updates) asked = merged(asked, update(asked, model) ?? {});
+      requireControls(model);
+      model.generator.request(merged(asked, model.state));
+    }
   }
 
   /** Takes all models out and forgets all names. */
@@ -159,6 +219,33 @@ export class GaussianModels {
   }
 }
 
+/** Controls and images of both, by their names; of everything else the second. */
+function merged(state: GeneratorState, over: GeneratorState): GeneratorState {
+  const { controls, pictures } = state;
+  return {
+    ...state,
+    ...over,
+    ...(controls && over.controls ? { controls: { ...controls, ...over.controls } } : {}),
+    ...(pictures && over.pictures ? { pictures: { ...pictures, ...over.pictures } } : {}),
+  };
+}
+
+/** Controls of a model alone must be its own; those of all models may belong to another. */
+function requireControls({ name, generator, state }: GaussianModel): void {
+  if (state.controls === undefined) return;
+  const known = generator.models.flatMap(({ contract }) =>
+    Object.entries(contract.inputs).flatMap(([input, { role }]) => (role === 'control' ? [input] : [])),
+  );
+  const unknown = Object.keys(state.controls).find((control) => !known.includes(control));
+  if (unknown === undefined) return;
+  throw new GaussianSplatError('argument/value', {
+    where: `state.controls of generator ${JSON.stringify(name)}`,
+    expected: known.length > 0 ? `controls of its contract: ${known.join(', ')}` : 'no controls: its contract has none',
+    found: unknown,
+    remedy: 'correct the name, or declare the control in the contract',
+  });
+}
+
 const circle = (names: readonly string[]): ContractError =>
   new ContractError([
     {
@@ -188,9 +275,11 @@ export const registerGaussianGenerator: GaussianModels['registerGaussianGenerato
 /** {@link GaussianModels.loadAllGenerators} of the page. */
 export const loadAllGenerators: GaussianModels['loadAllGenerators'] = (device) => page.loadAllGenerators(device);
 /** {@link GaussianModels.addGaussianModelToScene} of the page. */
-export const addGaussianModelToScene: GaussianModels['addGaussianModelToScene'] = (name, makeSink) =>
-  page.addGaussianModelToScene(name, makeSink);
+export const addGaussianModelToScene: GaussianModels['addGaussianModelToScene'] =
+  page.addGaussianModelToScene.bind(page);
 /** {@link GaussianModels.onFrame} of the page. */
-export const onFrame: GaussianModels['onFrame'] = (listener, onError) => page.onFrame(listener, onError);
+export const onFrame: GaussianModels['onFrame'] = (update) => page.onFrame(update);
+/** {@link GaussianModels.onGenerated} of the page. */
+export const onGenerated: GaussianModels['onGenerated'] = (listener, onError) => page.onGenerated(listener, onError);
 /** {@link GaussianModels.runGenerators} of the page. */
 export const runGenerators: GaussianModels['runGenerators'] = (state) => page.runGenerators(state);

@@ -14,9 +14,12 @@ export {
   GaussianModels,
   loadAllGenerators,
   onFrame,
+  onGenerated,
   registerGaussianGenerator,
   runGenerators,
+  type FrameUpdate,
   type GaussianModel,
+  type GaussianModelScene,
   type MakeSink,
 } from './gaussian-models.js';
 export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputValue } from './input-value.js';

@@ -1,17 +1,18 @@
+import type { HostedGaussians, SceneHost } from '@gaussian-splat/core';
 import type { GaussianLayout } from '@gaussian-splat/core/contract';
+import type { Object3D } from 'three/webgpu';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { SplatScene, type SplatSceneOptions } from './splat-scene.js';
 
 /**
- * What a generator writes, as an object of a three.js scene. Make it where `@gaussian-splat/generator` asks for a sink:
+ * What a generator writes, as an object of a three.js scene:
  *
  * ```ts
  * const models = new GaussianModels();
  * models.registerGaussianGenerator('avatar', { url: 'avatar.onnx' });
  * await models.loadAllGenerators(device); // renderer.backend.device
- * const { gaussians: avatar } = await models.addGaussianModelToScene('avatar', (layout) => GeneratedSplats.create(device, layout));
+ * const { gaussians: avatar } = await models.addGaussianModelToScene('avatar', scene); // after new SplatRenderer(renderer)
  * avatar.position.x = 2;
- * scene.add(avatar);
  * models.runGenerators({ timeSeconds: 1 });
  * ```
  */
@@ -50,3 +51,13 @@ export class GeneratedSplats extends SplatScene {
     this.#written.destroy();
   }
 }
+
+/** Takes models of `@gaussian-splat/generator` into scenes of three.js. */
+export const generatedSplatsHost: SceneHost<Object3D, GPUDevice, GeneratedSplats> = {
+  accepts: (scene: unknown): scene is Object3D => (scene as Partial<Object3D> | null)?.isObject3D === true,
+  async receive(scene, device, layout): Promise<HostedGaussians<GeneratedSplats>> {
+    const gaussians = await GeneratedSplats.create(device, layout);
+    scene.add(gaussians);
+    return { gaussians, remove: () => gaussians.dispose() };
+  },
+};

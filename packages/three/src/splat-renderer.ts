@@ -1,20 +1,29 @@
-import { cameraFromProjection, GaussianSplatError } from '@gaussian-splat/core';
+import {
+  cameraFromProjection,
+  GaussianSplatError,
+  registerSceneHost,
+  type Camera as SplatCamera,
+} from '@gaussian-splat/core';
 import { LinearColours, SceneDepth, type FrameSettings } from '@gaussian-splat/renderer';
 import { texture } from 'three/tsl';
 import {
   DepthTexture,
   FloatType,
   HalfFloatType,
+  Matrix4,
   NodeMaterial,
   QuadMesh,
   RenderTarget,
+  Quaternion,
   Vector2,
+  Vector3,
   WebGPUCoordinateSystem,
   type Camera,
   type Object3D,
   type Texture,
   type WebGPURenderer,
 } from 'three/webgpu';
+import { generatedSplatsHost } from './generated-splats.js';
 import { SplatWorld } from './splat-world.js';
 
 export interface SplatRendererOptions {
@@ -60,6 +69,7 @@ export class SplatRenderer {
     this.#device = device;
     this.#options = options;
     this.#colours = new LinearColours(device);
+    registerSceneHost(generatedSplatsHost);
   }
 
   /** Draws meshes and splats to where the renderer draws: a render target, or the canvas with its tone mapping and colour space. */
@@ -90,6 +100,28 @@ export class SplatRenderer {
     const depth = target.depthTexture ? this.#depthOf(this.#gpu(target.depthTexture), camera) : undefined;
     const picture = { target: this.#gpu(target.texture), over: 'target', colours: this.#colours, depth } as const;
     world.viewpoint.draw(view, picture);
+  }
+
+  /**
+   * The state that a generator needs if its contract has inputs for the camera: `models.runGenerators({ ...splats.stateOf(camera, model), timeSeconds })`.
+   * @param model the object that shows it: a generator sees the camera from its own frame. Default: it stands at the origin.
+   * @throws GaussianSplatError `argument/camera` for a camera with a skewed projection.
+   */
+  stateOf(camera: Camera, model?: Object3D): { readonly camera: SplatCamera } {
+    camera.updateWorldMatrix(true, false);
+    model?.updateWorldMatrix(true, false);
+    const toModel = new Matrix4();
+    if (model) toModel.copy(model.matrixWorld).invert();
+    const place = toModel.multiply(camera.matrixWorld);
+    const [position, turn] = [new Vector3(), new Quaternion()];
+    place.decompose(position, turn, new Vector3());
+    // Lengths of the frame change with its scale, angles of the camera do not.
+    const view = place.compose(position, turn, new Vector3(1, 1, 1)).invert();
+    const { x: width, y: height } = this.#renderer.getDrawingBufferSize(this.#size);
+    const clipDepth = camera.coordinateSystem === WebGPUCoordinateSystem ? '0..1' : '-1..1';
+    return {
+      camera: cameraFromProjection(view.elements, camera.projectionMatrix.elements, { width, height, clipDepth }),
+    };
   }
 
   /** Frees the memory of a camera, or of all; what is drawn afterwards allocates anew. */

@@ -1,7 +1,14 @@
 /** What this package uses of three.js, which brings no types of its own. Pages that use `@types/three` see those. */
 export class Matrix4 {
   readonly elements: number[];
+  copy(matrix: Matrix4): this;
+  invert(): this;
+  multiply(matrix: Matrix4): this;
+  compose(position: Vector3, quaternion: Quaternion, scale: Vector3): this;
+  decompose(position: Vector3, quaternion: Quaternion, scale: Vector3): this;
 }
+
+export class Quaternion {}
 
 export class Vector2 {
   x: number;
@@ -13,6 +20,7 @@ export class Layers {
 }
 
 export class Vector3 {
+  constructor(x?: number, y?: number, z?: number);
   set(x: number, y: number, z: number): this;
   setScalar(value: number): this;
 }
@@ -23,10 +31,12 @@ export class Euler {
 }
 
 export class Object3D {
+  readonly isObject3D: true;
+  readonly children: readonly Object3D[];
   readonly position: Vector3;
   readonly rotation: Euler;
   readonly scale: Vector3;
-  add(object: Object3D): this;
+  add(...objects: Object3D[]): this;
   remove(object: Object3D): this;
   removeFromParent(): this;
   lookAt(x: number, y: number, z: number): void;
@@ -34,6 +44,7 @@ export class Object3D {
   visible: boolean;
   readonly layers: Layers;
   readonly matrixWorld: Matrix4;
+  updateWorldMatrix(updateParents: boolean, updateChildren: boolean): void;
   traverseVisible(callback: (object: Object3D) => void): void;
 }
 

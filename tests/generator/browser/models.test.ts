@@ -1,6 +1,6 @@
 /** The papers' names over the typed core, and the build that a page loads from a CDN. */
 import { GaussianModels, Generator } from '@gaussian-splat/generator';
-import { DynamicGaussians } from '@gaussian-splat/renderer';
+import { DynamicGaussians, World } from '@gaussian-splat/renderer';
 import { assert, assertEqual, delay, nextEvent, until } from '../../element/browser/support/harness.js';
 import { FIXTURES, makeDevice } from './support.js';
 
@@ -22,7 +22,7 @@ describe('models of a page', () => {
       models.addGaussianModelToScene('ball', (layout) => DynamicGaussians.create(device, layout));
     const [a, b] = [await add(), await add()];
     const heard: [number, number | undefined][] = [];
-    const stop = models.onFrame((model, { state }) => heard.push([model === a ? 0 : 1, state.timeSeconds]));
+    const stop = models.onGenerated((model, { state }) => heard.push([model === a ? 0 : 1, state.timeSeconds]));
     b.state = { timeSeconds: 9 };
     models.runGenerators({ timeSeconds: 1 });
     await Promise.all([a.generator.idle, b.generator.idle]);
@@ -44,6 +44,61 @@ describe('models of a page', () => {
     device.destroy();
   });
 });
+
+describe('models of the papers', () => {
+  it('stand in a world, and take what a callback gives before each run', async () => {
+    const device = await makeDevice();
+    const models = new GaussianModels();
+    const world = new World();
+    models.registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });
+    await models.loadAllGenerators(device);
+    const sceneToWorld = [1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+    const a = await models.addGaussianModelToScene('ball', world, { sceneToWorld });
+    const b = await models.addGaussianModelToScene('ball', world);
+    assertEqual([world.placements.length, a.placement.sceneToWorld?.[3], a.name], [2, 2, 'ball']);
+    assert(world.placements[0].scene === a.gaussians, 'what is drawn is what it writes');
+    const shown: (number | undefined)[][] = [];
+    models.onGenerated((model, { state }) => shown.push([model === a ? 0 : 1, state.timeSeconds, state.seed]));
+    let time = 3;
+    const stop = models.onFrame((state, model) =>
+      model === a ? { timeSeconds: time++, seed: state.seed } : undefined,
+    );
+    models.runGenerators({ timeSeconds: 1, seed: 5 });
+    await Promise.all([a.generator.idle, b.generator.idle]);
+    models.runGenerators();
+    await Promise.all([a.generator.idle, b.generator.idle]);
+    stop();
+    models.runGenerators({ timeSeconds: 7 });
+    await Promise.all([a.generator.idle, b.generator.idle]);
+    assertEqual(
+      shown.filter(([model]) => model === 0).map(([, at]) => at),
+      [3, 4, 7],
+    );
+    assertEqual(shown.find(([model]) => model === 1)?.slice(1), [1, 5], 'the other has the state of the page');
+    a.state = { controls: { twitst: 1 } };
+    assertEqual(
+      codeOf(() => models.runGenerators()),
+      'argument/value',
+    );
+    a.remove();
+    assertEqual(world.placements.length, 1, 'removed from the world, too');
+    for (const scene of [{}, { isObject3D: true, add: () => undefined }, undefined]) {
+      const error: unknown = await models.addGaussianModelToScene('ball', scene as World).catch((e: unknown) => e);
+      assertEqual((error as { code: string }).code, 'argument/value', `a scene of ${typeof scene}`);
+    }
+    models.clear();
+    device.destroy();
+  });
+});
+
+function codeOf(work: () => void): string {
+  try {
+    work();
+  } catch (error) {
+    return (error as { code: string }).code;
+  }
+  return 'none';
+}
 
 describe('generators of a page that are not wanted any more', () => {
   it('are closed: of a sink that cannot be made, of two loads at once, and cleared while they load', async () => {

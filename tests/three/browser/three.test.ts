@@ -177,9 +177,9 @@ describe('splats in a three.js scene', () => {
       return shown(canvas);
     };
     const nothing = draw();
-    const model = await models.addGaussianModelToScene('ball', (layout) => GeneratedSplats.create(device, layout));
-    const ball = model.gaussians;
-    scene.add(ball);
+    const model = await models.addGaussianModelToScene('ball', scene);
+    const ball = model.gaussians as GeneratedSplats;
+    assert(scene.children.includes(ball), 'in the graph');
     assert(worst(draw(), nothing) === 0, 'nothing before the first run');
     models.runGenerators({ timeSeconds: 1 });
     await model.generator.idle;
@@ -198,8 +198,18 @@ describe('splats in a three.js scene', () => {
     models.runGenerators({ timeSeconds: 2 });
     await model.generator.idle;
     assert(ball.version === before + 1, 'another run is taken in');
+    const moved = splats.stateOf(camera, ball).camera.worldToCamera;
+    ball.position.set(1, 0, 0);
+    ball.scale.setScalar(2);
+    const own = splats.stateOf(camera, ball).camera.worldToCamera;
+    const eye = (m: ArrayLike<number>): number[] =>
+      [0, 1, 2].map((k) => -(m[k] * m[3] + m[4 + k] * m[7] + m[8 + k] * m[11]));
+    const wanted = eye(moved).map((x, k) => (x - (k === 0 ? 1 : 0)) / 2);
+    assert(
+      eye(own).every((x, k) => Math.abs(x - wanted[k]) < 1e-6),
+      `the eye in its own frame: ${eye(own).join(' ')}`,
+    );
     model.remove();
-    ball.dispose();
     assert(worst(draw(), nothing) === 0, 'gone from the graph, gone from the picture');
     models.clear();
     splats.dispose();

@@ -22,6 +22,9 @@ const HALF_SMALLEST = 2 ** -25;
 /** A covariance R·S·Sᵀ·Rᵀ computed in the type of its numbers takes some ten roundings to each of them. */
 const COVARIANCE_ROUNDINGS = 16;
 
+/** Its square is a covariance in float32. */
+const LARGEST_SCALE = 1e18;
+
 /** What is wrong with one attribute of one row; undefined if nothing is. */
 export function checkRow(reader: RowReader, row: number): RowFault | undefined {
   const { attribute, activation, components, read } = reader;
@@ -66,10 +69,10 @@ function checkOpacity({ read, isHalf }: RowReader, row: number): RowFault | unde
 
 function checkScale({ read, components }: RowReader, row: number): RowFault | undefined {
   const scales = Array.from({ length: components }, (_, i) => read(row, i));
-  if (scales.every((scale) => scale >= 0)) return undefined;
+  if (scales.every((scale) => scale >= 0 && scale <= LARGEST_SCALE)) return undefined;
   return {
     code: 'contract/covariance',
-    expected: 'standard deviations of 0 or more',
+    expected: 'standard deviations of 0 to 1e18',
     found: scales.join(' '),
     remedy: 'apply the exponential in the model, or declare scaleActivation "log"',
   };

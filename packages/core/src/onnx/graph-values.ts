@@ -49,6 +49,11 @@ export class GraphValues {
     );
   }
 
+  /** Whether any tensor has this type. */
+  has(dtype: OnnxDtype): boolean {
+    return [...this.#types.values()].includes(dtype);
+  }
+
   makerOf(name: string): OnnxNode | undefined {
     return this.#makers.get(name);
   }

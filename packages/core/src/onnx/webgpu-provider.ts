@@ -7,10 +7,10 @@ const UNCASTABLE: readonly OnnxDtype[] = ['uint16', 'int16', 'float64'];
 
 /**
  * One reason why a file will not stay on the GPU (`fallback`), not run there (`failure`), compute other numbers there than on the CPU
- * (`wrong`), or be slow.
+ * (`wrong`), lose digits there for some inputs (`inexact`), or be slow.
  */
 export interface GpuFinding {
-  readonly kind: 'fallback' | 'failure' | 'wrong' | 'slow';
+  readonly kind: 'fallback' | 'failure' | 'wrong' | 'inexact' | 'slow';
   /** The operator; `file`, `shape` or `type` where it is none. */
   readonly operator: string;
   /** The tensor that the node writes first, or that is meant. */
@@ -28,7 +28,7 @@ export interface Convolution {
   readonly group: number;
 }
 
-/** Types among a file's casts that pages cannot cast. */
+/** Types among a file's casts that pages cannot cast; and bfloat16, which they do not even store. */
 export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
   const values = new GraphValues(header);
   const used = new Set<OnnxDtype | undefined>();
@@ -36,7 +36,7 @@ export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
     if (operator !== 'Cast') continue;
     used.add(values.dtypeOf(inputs[0])).add(values.dtypeOf(outputs[0]));
   }
-  return UNCASTABLE.filter((dtype) => used.has(dtype));
+  return [...UNCASTABLE.filter((dtype) => used.has(dtype)), ...(values.has('bfloat16') ? (['bfloat16'] as const) : [])];
 }
 
 /**
@@ -133,6 +133,11 @@ function axisOfInstances({ metadata }: OnnxHeader): string | undefined {
 function* ofFile(header: OnnxHeader, opset: number): Iterable<GpuFinding> {
   const { irVersion, inputs, outputs } = header;
   const axis = axisOfInstances(header);
+  const values = new GraphValues(header);
+  if (values.has('bfloat16')) {
+    const reason = 'the file has tensors of bfloat16, which pages neither store nor cast';
+    yield { kind: 'failure', operator: 'bfloat16', tensor: '', reason, remedy: 'export it in float32: module.float()' };
+  }
   if (opset > RULES.newestOpset || irVersion > RULES.newestIr) {
     const reason = `opset ${opset}, IR ${irVersion} are newer than ${RULES.newestOpset} and ${RULES.newestIr}`;
     yield { kind: 'failure', operator: 'file', tensor: '', reason, remedy: `export opset ${RULES.exportOpset}` };
@@ -180,6 +185,12 @@ const kernelRule: Rule = function* (node, opset, _, { functions }) {
   const { operator } = node;
   if (operator.includes(':')) {
     if (functions.has(operator)) return;
+    const name = operator.replace(/^com\.microsoft:/, '');
+    if ((RULES.contrib as readonly string[]).includes(name)) {
+      const wrong = RULES.miscomputed[name];
+      if (wrong) yield of('wrong', node, wrong, 'write it in operators of ai.onnx');
+      return;
+    }
     const domain = operator.slice(0, operator.lastIndexOf(':'));
     yield of('failure', node, `domain ${domain} is not part of ONNX`, 'write it in operators of ai.onnx');
   } else if ((RULES.controlFlow as readonly string[]).includes(operator)) {
@@ -234,4 +245,21 @@ const sizeRule: Rule = function* (node, _, values) {
   }
 };
 
-const NODE_RULES: readonly Rule[] = [kernelRule, typeRule, sizeRule];
+const exactnessRule: Rule = function* (node, _, values) {
+  const { operator, inputs, numbers } = node;
+  if ((RULES.inexact as readonly string[]).includes(operator.replace(/^com\.microsoft:/, ''))) {
+    const reason = 'its variance loses digits where the mean is 100 times the deviation or more';
+    yield of('inexact', node, reason, 'subtract the mean first if its inputs have a large one');
+  }
+  if (operator === 'Resize' && numbers?.antialias) {
+    const reason = 'WebGPU does not resize with antialias, so the whole model runs on the CPU';
+    yield of('failure', node, reason, 'resize before, or without antialias');
+  }
+  const types = new Set(inputs.map((name) => values.dtypeOf(name)).filter((dtype) => dtype !== undefined));
+  if (operator === 'Pow' && types.size > 1) {
+    const reason = 'its exponent has another type than its base: it runs unrecorded';
+    yield of('fallback', node, reason, 'write the exponent as a float, or multiply');
+  }
+};
+
+const NODE_RULES: readonly Rule[] = [kernelRule, typeRule, sizeRule, exactnessRule];

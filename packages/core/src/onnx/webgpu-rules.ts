@@ -10,7 +10,7 @@ export const WEBGPU_RULES = {
     GlobalMaxPool Greater GreaterOrEqual GridSample HardSigmoid HardSwish Identity InstanceNormalization LayerNormalization LeakyRelu Less
     LessOrEqual Log LpNormalization MatMul MaxPool Mul Neg Not Pad Pow RMSNormalization Range Reciprocal ReduceL1 ReduceL2 ReduceLogSum
     ReduceLogSumExp ReduceMax ReduceMean ReduceMin ReduceProd ReduceSum ReduceSumSquare Relu Reshape Resize ScatterElements ScatterND Shape
-    Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Unsqueeze Where`.split(
+    Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Trilu Unsqueeze Where`.split(
       /\s+/,
     ),
   /** What to write instead of operators that people use in generators. */
@@ -29,6 +29,14 @@ export const WEBGPU_RULES = {
     SpaceToDepth: 'Reshape and Transpose',
     Det: 'write the determinant out in Mul and Sub',
   } as Readonly<Record<string, string>>,
+  /** Operators of com.microsoft that have a kernel. */
+  contrib: ['MultiHeadAttention', 'SkipLayerNormalization', 'SkipSimplifiedLayerNormalization'],
+  /** Operators whose kernel computes other numbers than the CPU does. */
+  miscomputed: {
+    MultiHeadAttention: 'WebGPU computes it wrongly for more than one query, so the whole model runs on the CPU',
+  } as Readonly<Record<string, string>>,
+  /** Operators that compute a variance as the mean of squares less the square of the mean. */
+  inexact: ['InstanceNormalization', 'LayerNormalization', 'SkipLayerNormalization'],
   controlFlow: ['If', 'Loop', 'Scan'],
   /** Their results are another shape of what they take: no kernel writes an output that one of them makes. */
   aliases: ['Reshape', 'Squeeze', 'Unsqueeze', 'Flatten', 'Identity'],

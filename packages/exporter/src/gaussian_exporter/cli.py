@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import cast, get_args
 
 import onnx
+from google.protobuf.message import DecodeError
 
 from .checkpoints.avatar_file import read_avatar
 from .checkpoints.clouds import read_cloud
@@ -33,8 +34,10 @@ from .families.image_filter import export_image_filter
 from .families.scaffold import export_scaffold
 from .families.spacetime import export_spacetime
 from .graph import Weights
+from .header import contract_faults, header_faults
 from .outputs import Options, refuse_instances, save
 from .placement import gpu_findings, told
+from .written import Fault
 
 Command = argparse.ArgumentParser
 Export = Callable[[argparse.Namespace, Facts, Options], onnx.ModelProto]
@@ -130,7 +133,7 @@ def export(given: argparse.Namespace) -> None:
 
 def cost(given: argparse.Namespace) -> None:
     """Prints what a run of a file costs, without running it."""
-    model = onnx.load(existing(given.file, "an .onnx file"), load_external_data=False)
+    model = loaded(given.file)
     for line in report(cost_of(model, given.instances), given.rows):
         print(line)
 
@@ -138,26 +141,47 @@ def cost(given: argparse.Namespace) -> None:
 def check(given: argparse.Namespace) -> None:
     """Holds a file against its contract, and reports what would leave the GPU."""
     path = given.file
-    model = onnx.load(existing(path, "an .onnx file"))
+    model = loaded(path)
     beside = path.with_suffix(".contract.json")
     if METADATA_KEY not in {prop.key for prop in model.metadata_props} and beside.exists():
-        model.metadata_props.add(key=METADATA_KEY, value=beside.read_text())
+        model.metadata_props.add(key=METADATA_KEY, value=beside.read_text(errors="replace"))
     try:
         contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     except ExportError:
         # What leaves the GPU is known without one.
         report_findings(model)
         raise
+    wrong = list(contract_faults(contract))
+    raise_faults([*wrong, *header_faults(model, None if wrong else contract, path.parent)])
     print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")
     if find_spec("onnxruntime") is None:
         print("not run: install onnxruntime (pip install 'gaussian-splat-exporter[check]')")
     else:
-        for name, values in check_outputs(model).items():
+        for name, values in check_outputs(model, path=path).items():
             print(f"ran on the CPU: {name} {list(values.shape)} {values.dtype}, all checks passed")
     report_findings(model)
-    for finding in gpu_findings(model):
-        if finding.is_refused:
-            raise finding.error()
+
+
+def loaded(path: Path) -> onnx.ModelProto:
+    """The file without its external data."""
+    try:
+        return onnx.load(existing(path, "an .onnx file"), load_external_data=False)
+    except DecodeError as error:
+        raise ExportError(
+            "graph/invalid",
+            where=str(path),
+            expected="an ONNX file",
+            found=str(error),
+            remedy="check that it was downloaded or written completely",
+        ) from error
+
+
+def raise_faults(faults: Sequence[Fault]) -> None:
+    """Prints all but the first, and raises that."""
+    for fault in faults[1:]:
+        print(f"gaussian-export: {fault.error()}", file=sys.stderr)
+    if faults:
+        raise faults[0].error()
 
 
 def report_findings(model: onnx.ModelProto) -> None:
@@ -165,7 +189,7 @@ def report_findings(model: onnx.ModelProto) -> None:
     findings = gpu_findings(model)
     for line in told(findings):
         print(line)
-    if not findings:
+    if all(finding.kind == "inexact" for finding in findings):
         print("WebGPU: every node has a kernel, shapes are fixed, the graph can be captured")
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -30,7 +32,7 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
     shape = [dim.dim_value or 1 for dim in tensor.shape.dim]
     dtype = helper.tensor_dtype_to_np_dtype(tensor.elem_type)
     if binding is None:
-        raise _violation(value.name, "a role for every input", "none", "name it in the contract")
+        raise _violation("unbound-input", value.name, "a role for every input", "none", "name it in the contract")
     if binding["role"] == "camera_position":
         box = cast(dict[str, list[float]], contract.get("bounds", {"min": [0.0] * 3, "max": [0.0] * 3}))
         low, high = np.array(box["min"]), np.array(box["max"])
@@ -57,12 +59,26 @@ def _flat(shape: list[int]) -> int:
     return int(np.prod(shape))
 
 
-def check_outputs(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = None) -> dict[str, AnyArray]:
+@contextmanager
+def running(doing: str) -> Iterator[None]:
+    """What ONNX Runtime says of a model, as contract/run."""
+    try:
+        yield
+    except Exception as error:  # the runtime has a class for each of its errors
+        found = " ".join(str(error).split())[:400]
+        remedy = "correct the export; the message names the node"
+        raise _violation("run", f"{doing} the model with ONNX Runtime on the CPU", "no error", found, remedy) from error
+
+
+def check_outputs(
+    model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = None, path: Path | None = None
+) -> dict[str, AnyArray]:
     """Runs the model on the CPU provider of onnxruntime, at defaults twice, at other times, and at both ends of its
     controls; returns its outputs at defaults.
 
-    Raises contract/violation for shapes and numbers that the contract does not allow, or results that differ from run
-    to run without a seed; needs onnxruntime.
+    Raises contract/... for shapes and numbers that the contract does not allow, contract/run for a model that
+    ONNX Runtime does not run, contract/not-deterministic for results that differ from run
+    to run without a seed; needs onnxruntime. `path`: of a file with external data beside it.
     """
     import onnxruntime as ort
 
@@ -70,18 +86,21 @@ def check_outputs(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = No
     given = default_feeds(model, contract) | (feeds or {})
     options = ort.SessionOptions()
     options.log_severity_level = 4
-    session = ort.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+    with running("loading"):
+        given_model = model.SerializeToString() if path is None else str(path)
+        session = ort.InferenceSession(given_model, options, providers=["CPUExecutionProvider"])
     names = [output.name for output in session.get_outputs()]
 
     def run(state: dict[str, AnyArray]) -> dict[str, AnyArray]:
-        return dict(zip(names, session.run(None, given | state), strict=True))
+        with running("running"):
+            return dict(zip(names, session.run(None, given | state), strict=True))
 
     first = run({})
     _raise_first(contract, first, "defaults", True)
     if not any(binding["role"] == "seed" for binding in _bindings(contract).values()):
         for name, values in run({}).items():
             if not np.array_equal(values, first[name], equal_nan=True):
-                raise _violation(name, "the same result twice", "a difference", "declare a seed")
+                raise _violation("not-deterministic", name, "the same result twice", "a difference", "declare a seed")
     for label, is_default, state in _states(contract, given):
         _raise_first(contract, run(state), label, is_default)
     return first
@@ -124,5 +143,5 @@ def _states(contract: Json, given: dict[str, AnyArray]) -> Iterator[tuple[str, b
         yield label, False, {name: np.full_like(given[name], limits[end]) for name, limits in ranges.items()}
 
 
-def _violation(where: str, expected: str, found: str, remedy: str) -> ExportError:
-    return ExportError("contract/violation", where=where, expected=expected, found=found, remedy=remedy)
+def _violation(code: str, where: str, expected: str, found: str, remedy: str) -> ExportError:
+    return ExportError(f"contract/{code}", where=where, expected=expected, found=found, remedy=remedy)

@@ -206,10 +206,10 @@ def metadata(contract: Json) -> dict[str, str]:
 def of_metadata(props: dict[str, str], where: str) -> Json:
     """The contract of a file's metadata_props. Raises contract/violation where there is none."""
     try:
-        found = json.loads(props[METADATA_KEY])
-    except (KeyError, ValueError) as error:
+        found = json.loads(props[METADATA_KEY].removeprefix("\ufeff"))
+    except (KeyError, ValueError, RecursionError) as error:
         raise ExportError(
-            "contract/violation",
+            "contract/json",
             where=where,
             expected=f"metadata '{METADATA_KEY}' with JSON in it",
             found="none" if isinstance(error, KeyError) else str(error),
@@ -217,7 +217,7 @@ def of_metadata(props: dict[str, str], where: str) -> Json:
         ) from error
     if not isinstance(found, dict) or found.get("version") != VERSION:
         raise ExportError(
-            "contract/violation",
+            "contract/version" if isinstance(found, dict) and "version" in found else "contract/schema",
             where=where,
             expected=f"a contract of version {VERSION}",
             found=str(found)[:80],

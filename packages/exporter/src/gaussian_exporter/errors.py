@@ -12,15 +12,15 @@ ErrorCode = Literal[
     "checkpoint/other-family",  # a known model with a part that has no exporter
     "argument/value",  # an option outside its range
     "graph/invalid",  # a graph that ONNX refuses
-    "contract/violation",  # outputs or metadata that break the contract
 ]
 
 
 class ExportError(Exception):
     """Anything the exporter cannot do. `code` is stable and meant for programs; the text is meant for people."""
 
-    def __init__(self, code: ErrorCode, *, where: str, expected: str, found: str, remedy: str):
-        """Every part is a full phrase without a trailing full stop."""
+    def __init__(self, code: ErrorCode | str, *, where: str, expected: str, found: str, remedy: str):
+        """Every part is a full phrase without a trailing full stop. `code`: an ErrorCode, or what breaks a contract:
+        `contract/...`, as the checker of pages has it."""
         super().__init__(f"{where}: expected {expected}, found {found}. {remedy[:1].upper()}{remedy[1:]}. [{code}]")
         self.code = code
         self.where = where

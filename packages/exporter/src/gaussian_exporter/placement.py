@@ -28,13 +28,13 @@ KERNELS = frozenset(RULES["kernels"])
 INSTEAD: dict[str, str] = RULES["instead"]
 _EXPORT = f"export opset {RULES['exportOpset']}"
 
-Kind = Literal["fallback", "failure", "wrong", "slow"]
+Kind = Literal["fallback", "failure", "wrong", "inexact", "slow"]
 
 
 @dataclass(frozen=True)
 class Finding:
     """One reason why a file will not stay on the GPU (fallback), not run (failure), compute
-    other numbers there than on the CPU (wrong), or be slow."""
+    other numbers there than on the CPU (wrong), lose digits for some inputs (inexact), or be slow."""
 
     kind: Kind
     node: str
@@ -47,12 +47,12 @@ class Finding:
     @property
     def is_refused(self) -> bool:
         """Whether pages refuse the file for it, instead of running it on the CPU."""
-        return self.kind == "failure" and self.operator in ("Cast", "file")
+        return self.kind == "failure" and self.operator in ("Cast", "file", "bfloat16")
 
     def error(self) -> ExportError:
         """To be raised where it is refused."""
         return ExportError(
-            "contract/violation",
+            "contract/operator",
             where=f"{self.operator} {self.node}".strip(),
             expected="what ONNX Runtime in a page can run",
             found=self.reason,
@@ -147,6 +147,10 @@ def _of_copies(model: onnx.ModelProto, values: _Values) -> Iterator[Finding]:
 
 
 def _of_file(model: onnx.ModelProto, opset: int, values: _Values) -> Iterator[Finding]:
+    narrow = sorted(name for name, kind in values.types.items() if kind == TensorProto.BFLOAT16)
+    if narrow:
+        reason = f"{narrow[0]} is bfloat16, which pages neither store nor cast"
+        yield Finding("failure", narrow[0], "bfloat16", reason, "export it in float32: module.float()")
     newest = RULES["newestOpset"], RULES["newestIr"]
     if opset > newest[0] or model.ir_version > newest[1]:
         found = f"opset {opset}, IR {model.ir_version}"
@@ -161,6 +165,19 @@ def _of_file(model: onnx.ModelProto, opset: int, values: _Values) -> Iterator[Fi
                 "under Linux): without it the whole model runs on the CPU"
             )
             yield Finding("failure", value.name, "type", reason, "offer a float32 file, too", value.name)
+
+
+def operators_of(model: onnx.ModelProto) -> set[tuple[str, str]]:
+    """Domain and name of each operator, those of subgraphs and functions included."""
+    found: set[tuple[str, str]] = set()
+    nodes = [*model.graph.node, *(node for function in model.functions for node in function.node)]
+    while nodes:
+        node = nodes.pop()
+        found.add((node.domain, node.op_type))
+        for attribute in node.attribute:
+            graphs = [*([attribute.g] if attribute.HasField("g") else []), *attribute.graphs]
+            nodes += [inner for graph in graphs for inner in graph.node]
+    return found
 
 
 def _is_fixed(value: onnx.ValueInfoProto, axis: str | None) -> bool:
@@ -183,7 +200,10 @@ def _of(kind: Kind, node: onnx.NodeProto, reason: str, remedy: str) -> Finding:
 
 
 def _kernel(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
-    if node.domain not in ("", "ai.onnx"):
+    if node.domain == "com.microsoft" and node.op_type in RULES["contrib"]:
+        if node.op_type in RULES["miscomputed"]:
+            yield _of("wrong", node, RULES["miscomputed"][node.op_type], "write it in operators of ai.onnx")
+    elif node.domain not in ("", "ai.onnx"):
         if (node.domain, node.op_type) not in values.functions:
             yield _of("failure", node, f"domain {node.domain} is not part of ONNX", "write it in operators of ai.onnx")
     elif node.op_type in RULES["controlFlow"]:
@@ -194,6 +214,19 @@ def _kernel(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findi
     elif node.op_type == "GridSample" and opset > RULES["gridSampleOpset"]:
         reason = f"WebGPU has kernels for it up to opset {RULES['gridSampleOpset']}"
         yield _of("fallback", node, f"{reason}: every run waits for the GPU in its midst", _EXPORT)
+
+
+def _inexact(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
+    if node.op_type in RULES["inexact"]:
+        reason = "its variance loses digits where the mean is 100 times the deviation or more"
+        yield _of("inexact", node, reason, "subtract the mean first if its inputs have a large one")
+    attributes = {attribute.name: attribute for attribute in node.attribute}
+    if node.op_type == "Resize" and "antialias" in attributes and attributes["antialias"].i:
+        reason = "WebGPU does not resize with antialias, so the whole model runs on the CPU"
+        yield _of("failure", node, reason, "resize before, or without antialias")
+    if node.op_type == "Pow" and len({values.types.get(name) for name in node.input} - {None}) > 1:
+        reason = "its exponent has another type than its base: it runs unrecorded"
+        yield _of("fallback", node, reason, "write the exponent as a float, or multiply")
 
 
 def _types(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
@@ -244,4 +277,4 @@ def miscomputed_convolution(node: onnx.NodeProto, dims: Sequence[int | None]) ->
     return (inputs, outputs) if is_wrong else None
 
 
-_RULES: list[Callable[[onnx.NodeProto, int, _Values], Iterator[Finding]]] = [_kernel, _types, _sizes, _casts]
+_RULES: list[Callable[[onnx.NodeProto, int, _Values], Iterator[Finding]]] = [_kernel, _types, _sizes, _casts, _inexact]

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from .arrays import AnyArray
 from .errors import ExportError
 
-FaultCode = Literal[
-    "missing-tensor", "shape", "dtype", "rows", "count", "not-finite", "covariance", "opacity", "conflict"
-]
+# As in packages/core/src/errors.ts, without "contract/".
+FaultCode = str
 Rule = Sequence[int | str]
 
-_FIELDS = (
+FIELDS = (
     *("gaussians", "positions", "covariances", "scales", "rotations", "colors", "sh", "opacities"),
     *("image", "count"),
 )
@@ -55,7 +54,7 @@ class Fault:
         """To be raised; `when` says of which run."""
         where = self.where + when
         return ExportError(
-            "contract/violation", where=where, expected=self.expected, found=self.found, remedy=self.remedy
+            f"contract/{self.code}", where=where, expected=self.expected, found=self.found, remedy=self.remedy
         )
 
 
@@ -71,7 +70,8 @@ class Attribute:
 Attributes = dict[str, Attribute]
 
 
-def _rules(outputs: Mapping[str, Any], field: str) -> list[Rule]:
+def rules_of(outputs: Mapping[str, Any], field: str) -> list[Rule]:
+    """Shapes that a field of a contract's `outputs` may have."""
     layout = outputs["layout"]
     if field == "gaussians":
         if layout == "visionary":
@@ -86,12 +86,22 @@ def _rules(outputs: Mapping[str, Any], field: str) -> list[Rule]:
     return _SHAPES[field]
 
 
-def _bare(shape: tuple[int, ...], rules: Sequence[Rule]) -> tuple[int, ...] | None:
+Shape = TypeVar("Shape", bound=tuple[Any, ...])
+
+
+def bare(shape: Shape, rules: Sequence[Rule]) -> Shape | None:
     """The shape without ones before it, as few left away as it takes; None where no rule allows it."""
     for rule in rules:
-        if len(rule) == len(shape) and all(isinstance(a, str) or a == b for a, b in zip(rule, shape, strict=True)):
+        if len(rule) == len(shape) and all(_fits(b, a) for a, b in zip(rule, shape, strict=True)):
             return shape
-    return _bare(shape[1:], rules) if shape[:1] == (1,) else None
+    return bare(cast(Shape, shape[1:]), rules) if shape[:1] == (1,) else None
+
+
+def _fits(dim: object, rule: int | str) -> bool:
+    """N, H and W may stay open; other letters are sizes that a file must fix."""
+    if isinstance(rule, int):
+        return dim == rule
+    return rule in ("N", "H", "W") or (isinstance(dim, int) and dim > 0)
 
 
 def read(
@@ -102,7 +112,7 @@ def read(
     faults: list[Fault] = []
     read: dict[str, AnyArray] = {}
     first: str | None = None
-    for field in _FIELDS:
+    for field in FIELDS:
         if field not in outputs:
             continue
         name = str(outputs[field])
@@ -112,8 +122,8 @@ def read(
             faults.append(Fault("missing-tensor", name, where, "this output", ", ".join(written) or "nothing", remedy))
             continue
         values = written[name]
-        rules = _rules(outputs, field)
-        shape = _bare(values.shape, rules)
+        rules = rules_of(outputs, field)
+        shape = bare(values.shape, rules)
         kinds = ("int32", "int64") if field == "count" else ("float32", "float16")
         if shape is None:
             expected = " or ".join(f"[{', '.join(map(str, rule))}]" for rule in rules)
@@ -214,6 +224,10 @@ def _are_opacities(rows: AnyArray) -> AnyArray:
     return cast(AnyArray, (rows.astype(np.float64) >= -slack).all(1) & (rows.astype(np.float64) <= 1 + slack).all(1))
 
 
+# Its square is a covariance in float32.
+_LARGEST = 1e18
+
+
 _RULES: dict[str, tuple[Any, FaultCode, str, str]] = {
     "covariances": (
         _are_covariances,
@@ -222,9 +236,9 @@ _RULES: dict[str, tuple[Any, FaultCode, str, str]] = {
         "write R S S^T R^T, and check the order of the six numbers",
     ),
     "scales": (
-        lambda rows: (rows >= 0).all(1),
+        lambda rows: ((rows >= 0) & (rows.astype(np.float64) <= _LARGEST)).all(1),
         "covariance",
-        "standard deviations of 0 or more",
+        "standard deviations of 0 to 1e18",
         'apply the exponential in the model, or declare logarithms: split(scales="log"), scaleActivation "log"',
     ),
     "rotations": (
