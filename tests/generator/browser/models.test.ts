@@ -83,7 +83,9 @@ describe('models of the papers', () => {
     a.remove();
     assertEqual(world.placements.length, 1, 'removed from the world, too');
     for (const scene of [{}, { isObject3D: true, add: () => undefined }, undefined]) {
-      const error: unknown = await models.addGaussianModelToScene('ball', scene as World).catch((e: unknown) => e);
+      const error: unknown = await models
+        .addGaussianModelToScene('ball', scene as unknown as World)
+        .catch((e: unknown) => e);
       assertEqual((error as { code: string }).code, 'argument/value', `a scene of ${typeof scene}`);
     }
     models.clear();
