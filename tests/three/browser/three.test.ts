@@ -10,7 +10,7 @@ import {
   type RasterizerName,
 } from '@gaussian-splat/renderer';
 import { GaussianModels } from '@gaussian-splat/generator';
-import { GeneratedSplats, SplatRenderer, SplatScene } from '@gaussian-splat/three';
+import { type GeneratedSplats, SplatRenderer, SplatScene } from '@gaussian-splat/three';
 import {
   BoxGeometry,
   Color,
