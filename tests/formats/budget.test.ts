@@ -12,6 +12,7 @@ import { readScene, type LoadLimits } from '@gaussian-splat/formats';
 import { isLab } from '../support/extent.js';
 import { expectRefusal } from './support/expect.js';
 import { MULTIPLIED, type Multiplied } from './support/multiplied.js';
+import { MULTIPLIED_MESHES } from './support/multiplied-meshes.js';
 import { smallCloud } from './support/small-cloud.js';
 import { buildGltf, writeGlb } from './support/gltf-writer.js';
 
@@ -34,8 +35,8 @@ interface Cost {
 
 /** Reads files, one after the other, with the heap of a small device. */
 function measured(all: readonly Multiplied[]): Cost[] {
-  const paths = all.flatMap(({ file, beside }, k) => {
-    const [path, other] = [join(folder, `file${k}`), join(folder, `beside${k}`)];
+  const paths = all.flatMap(({ file, beside, isMesh }, k) => {
+    const [path, other] = [join(folder, `file${k}${isMesh ? '.mesh' : ''}`), join(folder, `beside${k}`)];
     writeFileSync(path, file);
     if (beside) writeFileSync(other, beside);
     return [path, beside ? other : ''];
@@ -47,7 +48,7 @@ function measured(all: readonly Multiplied[]): Cost[] {
   return lines.map((line) => JSON.parse(line) as Cost);
 }
 
-for (const [name, multiply] of Object.entries(MULTIPLIED)) {
+for (const [name, multiply] of Object.entries({ ...MULTIPLIED, ...MULTIPLIED_MESHES })) {
   test(`${name}, 10 to 1,000,000 times`, (context) => {
     const sized: { factor: number; made: Multiplied; bytes: number }[] = [];
     for (const factor of FACTORS) {

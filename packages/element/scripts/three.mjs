@@ -6,10 +6,10 @@ export {
   DepthTexture,
   FloatType,
   HalfFloatType,
-  LoadingManager,
   PMREMGenerator,
   RenderTarget,
   Scene,
+  Texture,
   WebGPUCoordinateSystem,
   WebGPURenderer,
 } from 'three/webgpu';

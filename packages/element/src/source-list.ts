@@ -151,11 +151,14 @@ export class SourceList {
   /** The triangles of a file that has splats, too: they come after these, and what is wrong with them leaves the splats visible. */
   async #addMeshes(entry: SourceEntry, scene: LoadedGaussians): Promise<void> {
     try {
-      if (await (await this.meshes.get()).add(entry, scene)) this.frame('whole');
+      await (await this.meshes.get()).add(entry, scene);
+      this.frame('whole');
       this.changed();
     } catch (error) {
-      if (!scene.isDestroyed)
-        this.#stage.warn(`<gaussian-splat>: the triangles are not shown: ${(error as Error).message}`);
+      if (scene.isDestroyed) return;
+      const warning = `The triangles are not shown: ${(error as Error).message}`;
+      scene.warnings = [...scene.warnings, warning];
+      this.#stage.warn(`<gaussian-splat>: ${warning}`);
     }
   }
 

@@ -10,6 +10,8 @@ import { writeWebp } from './webp-writer.js';
 export interface Multiplied {
   readonly file: Uint8Array;
   readonly beside?: Uint8Array;
+  /** It is read for its triangles. */
+  readonly isMesh?: boolean;
 }
 
 const json = (value: unknown): Uint8Array => strToU8(JSON.stringify(value));

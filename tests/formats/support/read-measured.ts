@@ -1,11 +1,16 @@
 /**
- * `node --import tsx read-measured.ts FILE BESIDE …` reads files, each with one beside it or with '', in a process of their own, the cheapest first, and prints what each cost as a line
+ * `node --import tsx read-measured.ts FILE BESIDE …` reads files, each with one beside it or with '', those named `.mesh` for their triangles, in a process of their own, the cheapest first, and prints what each cost as a line
  * of JSON: milliseconds of CPU, and the most memory that the process had beyond what it had before.
  */
 import { existsSync, readFileSync } from 'node:fs';
-import { framePath, isSequence, parseSequence, readScene } from '@gaussian-splat/formats';
+import { framePath, isSequence, LoadBudget, parseSequence, readScene, readTriangles } from '@gaussian-splat/formats';
 
-async function read(file: Uint8Array, beside: string): Promise<string> {
+async function read(file: Uint8Array, beside: string, isMesh: boolean): Promise<string> {
+  if (isMesh) {
+    const openUri = async (): Promise<Uint8Array> => new Uint8Array(readFileSync(beside));
+    const { triangles } = await readTriangles({ bytes: file, name: 'a', budget: new LoadBudget(file.length), openUri });
+    return `${triangles} triangles`;
+  }
   if (isSequence(file)) {
     const sequence = parseSequence(file, 'a');
     return `${sequence.frameCount} frames, ${framePath(sequence, sequence.frameCount - 1).length} characters`;
@@ -24,7 +29,7 @@ async function measure(path: string, beside: string): Promise<void> {
   const file = new Uint8Array(readFileSync(path));
   const before = process.memoryUsage().rss;
   const start = process.cpuUsage();
-  const result = await read(file, beside).catch(
+  const result = await read(file, beside, path.endsWith('.mesh')).catch(
     (error: { code?: string; message?: string }) => error.code ?? `unnamed: ${error.message}`,
   );
   const { user, system } = process.cpuUsage(start);

@@ -52,14 +52,14 @@ export class LoadedGaussians {
   /** Its file has triangles, too. */
   readonly hasMeshes: boolean;
   /** What of its file is not drawn, for people. */
-  readonly warnings: readonly string[];
+  warnings: readonly string[];
   /** Called when the next frame would show more than the last one. */
   onChange: () => void = () => undefined;
   readonly #lease: DeviceLease;
   #gaussians: OwnedGaussians;
   #levels: OwnedLevels | undefined;
   #detail: DetailLevers;
-  #isDestroyed = false;
+  readonly #life = new AbortController();
 
   constructor(
     lease: DeviceLease,
@@ -157,14 +157,19 @@ export class LoadedGaussians {
     return this.#lease.lost;
   }
 
+  /** Aborted when it is destroyed. */
+  get signal(): AbortSignal {
+    return this.#life.signal;
+  }
+
   get isDestroyed(): boolean {
-    return this.#isDestroyed;
+    return this.signal.aborted;
   }
 
   /** Frees the GPU memory and lets go of the device. */
   destroy(): void {
-    if (this.#isDestroyed) return;
-    this.#isDestroyed = true;
+    if (this.isDestroyed) return;
+    this.#life.abort();
     this.live?.close();
     this.model?.dispose();
     this.#levels?.destroy();

@@ -1,7 +1,7 @@
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { startVariants } from '@gaussian-splat/renderer';
 import type { LiveModel, LiveRequest } from '../live/live-model.js';
-import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { FileRequest, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import { LoadedGaussians } from './loaded-gaussians.js';
@@ -50,7 +50,8 @@ export async function openScene(request: SceneRequest, options: OpenOptions): Pr
   return openGlScene(limited(request, options), options, reason);
 }
 
-const limited = (request: SceneRequest, { memoryBudget }: OpenOptions): SceneRequest => ({
+/** The request with the bytes that a load may take by default. */
+export const limited = <T extends FileRequest>(request: T, { memoryBudget }: Pick<OpenOptions, 'memoryBudget'>): T => ({
   ...request,
   limits: { maxBytes: loadBytes(memoryBudget), ...request.limits },
 });

@@ -110,18 +110,19 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
 };
 
 const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
-  const { levels, runs } = await loader.ask(
+  const { levels, files, runs, firstRuns } = await loader.ask(
     { type: 'boxes', request },
     signal,
     ({ openBoxes }) => openBoxes(request, signal, onProgress),
     { onProgress },
   );
-  const { credentials } = request;
+  const { url, credentials } = request;
   const allowance = new Allowance(request.limits);
   const source = levelSource(levels, async (page, aborted) => {
-    const run = runs[page.box][page.level];
+    const [file, first, count] = runs.subarray(3 * (firstRuns[page.box] + page.level));
     const part = `${page.box} ${page.level}`;
-    const box = { run, page, scene: levels.scene, credentials, limits: allowance.of(part) };
+    const place = { url, path: files[file], first, count };
+    const box = { ...place, page, scene: levels.scene, credentials, limits: allowance.of(part) };
     const here = ({ readBox }: Here): Promise<ArrayBuffer> => readBox(box, aborted);
     return new Uint32Array(await allowance.note(part, loader.ask({ type: 'box', request: box }, aborted, here)));
   });

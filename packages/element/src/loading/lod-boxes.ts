@@ -1,5 +1,14 @@
 /** Loaded by the worker when the first streamed SOG scene is asked for. */
-import { fetchScene, readCoarsest, readLodScene, SogFiles, type FetchSceneOptions } from '@gaussian-splat/formats';
+import {
+  fetchScene,
+  LoadBudget,
+  readCoarsest,
+  readLodScene,
+  sogAddress,
+  SogFiles,
+  type FetchSceneOptions,
+  type LodScene,
+} from '@gaussian-splat/formats';
 import { layOutLevels, packLevelPage } from '@gaussian-splat/renderer';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
@@ -7,6 +16,18 @@ import type { BoxRequest, LoadedBoxes, ProgressListener, SceneRequest } from './
 
 /** Of all such scenes of the page. */
 const files = new SogFiles();
+/** Scenes whose accounts are kept. */
+const MAX_ACCOUNTS = 64;
+/** What the files of a scene have cost since it was opened, by the address of its index. The page counts their bytes. */
+const accounts = new Map<string, LoadBudget>();
+
+function accountOf(url: string): LoadBudget {
+  const account = accounts.get(url) ?? new LoadBudget(0);
+  accounts.delete(url);
+  accounts.set(url, account);
+  for (const [oldest] of accounts) if (accounts.size > MAX_ACCOUNTS) accounts.delete(oldest);
+  return account;
+}
 
 /**
  * Reads the index of a streamed SOG scene and the coarsest level of each of its boxes. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or
@@ -32,22 +53,31 @@ export async function openBoxes(
     const lod = readLodScene(await fetch(url, signal), name, url, limits());
     const coarsest = await readCoarsest(lod, files, fetch, name, signal, limits());
     const boxes = lod.boxes.map(({ min, max, runs }) => ({ min, max, counts: runs.map(({ count }) => count) }));
-    return { levels: layOutLevels(coarsest, boxes, { sh }), runs: lod.boxes.map(({ runs }) => runs) };
+    return { levels: layOutLevels(coarsest, boxes, { sh }), ...placesOf(lod) };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
   }
 }
 
+/** As numbers: a message copies the text of a path for each object that has it. */
+function placesOf({ boxes, files }: LodScene): Pick<LoadedBoxes, 'files' | 'runs' | 'firstRuns'> {
+  const all = boxes.flatMap(({ runs }) => runs);
+  const firstRuns = new Uint32Array(boxes.length);
+  for (let b = 1; b < boxes.length; b++) firstRuns[b] = firstRuns[b - 1] + boxes[b - 1].runs.length;
+  return { files, runs: Float64Array.from(all.flatMap(({ file, first, count }) => [file, first, count])), firstRuns };
+}
+
 /** The words of a level of a box: see `packLevelPage`. Throws as {@link openBoxes} does. */
 export async function readBox(
-  { run, page, scene, credentials, limits }: BoxRequest,
+  { url, path, first, count, page, scene, credentials, limits }: BoxRequest,
   signal: AbortSignal,
 ): Promise<ArrayBuffer> {
+  const run = { ...sogAddress(path, fileName(url), url), first, count };
   try {
     const fetch = (part: string, aborted: AbortSignal): Promise<Uint8Array> =>
       fetchScene(part, { mode: 'cors', credentials, signal: aborted, ...fileLimits(limits ?? {}) });
-    return packLevelPage(await files.read(run, fetch, signal), page, scene).buffer;
+    return packLevelPage(await files.read(run, fetch, signal, accountOf(url)), page, scene).buffer;
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, run.name);

@@ -5,7 +5,7 @@ import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { FloorRequest } from './make-floor.js';
-import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
+import type { LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
 import type {
   CodedFile,
   LevelPage,
@@ -68,6 +68,12 @@ export interface LoadedScene {
   readonly hasMeshes?: boolean | undefined;
 }
 
+/** The triangles of a file, checked, with its images decoded. */
+export interface LoadedMesh extends Omit<TriangleFile, 'images'> {
+  /** Each image that is used. */
+  readonly images: readonly (ImageBitmap | undefined)[];
+}
+
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */
 export type LoadedSequence = SceneSequence;
 
@@ -83,13 +89,23 @@ export interface MovedFrameRequest {
 /** A streamed SOG scene of which the coarsest levels are there. */
 export interface LoadedBoxes {
   readonly levels: LevelScene;
-  /** Where the levels of each box lie, the coarsest first. */
-  readonly runs: readonly (readonly SogRun[])[];
+  /** Paths of the SOG files, relative to the index. */
+  readonly files: readonly string[];
+  /** The levels of all boxes, those of a box the coarsest first: number of the file, first splat, and count of each. */
+  readonly runs: Float64Array;
+  /** Number of the first run of each box. */
+  readonly firstRuns: Uint32Array;
 }
 
 /** A level of a box of such a scene: all that the worker must know, for it may have been ended meanwhile. */
 export interface BoxRequest {
-  readonly run: SogRun;
+  /** Absolute address of the index. */
+  readonly url: string;
+  /** Path of the SOG file, relative to the index. */
+  readonly path: string;
+  /** First splat there. */
+  readonly first: number;
+  readonly count: number;
   readonly page: LevelPage;
   readonly scene: StreamedScene;
   readonly credentials: RequestCredentials;
@@ -114,6 +130,7 @@ export type WorkerRequest =
   | { readonly type: 'levels'; readonly packed: PackedGaussians }
   | { readonly type: 'file'; readonly request: FileRequest }
   | { readonly type: 'manifest'; readonly request: FileRequest }
+  | { readonly type: 'mesh'; readonly request: FileRequest }
   | { readonly type: 'boxes'; readonly request: SceneRequest }
   | { readonly type: 'box'; readonly request: BoxRequest }
   | { readonly type: 'frame'; readonly request: MovedFrameRequest }

@@ -11,6 +11,7 @@ import {
   type BoxRequest,
   type FileRequest,
   type LoadedBoxes,
+  type LoadedMesh,
   type LoadedScene,
   type ModelRequest,
   type MovedFrameRequest,
@@ -73,10 +74,24 @@ export const makeFloor = async (request: FloorRequest, signal: AbortSignal): Pro
   return code.makeFloor(request, signal);
 };
 
+export const openMeshFile = async (
+  request: FileRequest,
+  signal: AbortSignal,
+  onProgress?: ProgressListener,
+): Promise<LoadedMesh> => {
+  const code = await loadModule('the code that reads meshes', () => import('./open-mesh-file.js'));
+  return code.openMeshFile(request, signal, onProgress);
+};
+
 export const openModel = async (request: ModelRequest, signal: AbortSignal): Promise<OpenedModel> => {
   const code = await loadModule('the code that reads models', () => import('./open-model.js'));
   return code.openModel(request, signal);
 };
+
+const transferablesOf = ({ views, images }: LoadedMesh): Transferable[] => [
+  ...views.flatMap((view) => (view ? ('source' in view ? view.source : view).buffer : [])),
+  ...images.flatMap((image) => image ?? []),
+];
 
 /** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
 interface WorkerScope {
@@ -85,7 +100,7 @@ interface WorkerScope {
 }
 
 /** What came of a request, and its buffers, which change threads. */
-type Answer = readonly [answer: unknown, transfer?: ArrayBuffer[]];
+type Answer = readonly [answer: unknown, transfer?: Transferable[]];
 
 /** What is done for one request. */
 interface Work {
@@ -148,13 +163,17 @@ function serve(scope: WorkerScope): void {
       const scene = await readMovedFrame(message.request, signal, progressOf(id));
       return [scene, buffersOf(scene.packed)];
     }
+    if (message.type === 'mesh') {
+      const mesh = await openMeshFile(message.request, signal, progressOf(id));
+      return [mesh, transferablesOf(mesh)];
+    }
     if (message.type === 'model') {
       const model = await openModel(message.request, signal);
       return [model, model.whole ? [model.whole.buffer as ArrayBuffer] : []];
     }
     if (message.type === 'manifest') return [await openManifest(message.request, signal, progressOf(id))];
     const opened = await openBoxes(message.request, signal, progressOf(id));
-    return [opened, buffersOf(opened.levels)];
+    return [opened, buffersOf(opened, opened.levels)];
   }
 
   /** Does what a message asks for, and answers: with an error, too, that nobody has named. For what was called off nobody waits. */

@@ -150,7 +150,7 @@ export class MeshLayer {
     }
     for (const { model: known, toWorld } of models) {
       const model = known as Model;
-      if (!this.#shown.has(model)) this.#show(model);
+      this.#show(model);
       const { root } = model;
       root.matrixAutoUpdate = false;
       root.matrix.fromArray(transposed(multiply(toViewer, toWorld)));
@@ -159,6 +159,7 @@ export class MeshLayer {
   }
 
   #show(model: Model): void {
+    if (this.#shown.has(model)) return;
     this.#shown.set(model, model.root);
     this.#scene.add(model.root);
     model.root.traverse((object) => object.layers.enableAll());

@@ -3,11 +3,12 @@ import { multiply, type Matrix4 } from '@gaussian-splat/core';
 import type { FrameTarget, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import { credentialsOf } from '../attributes.js';
 import type { LoadedGaussians, MeshModel } from '../gpu/loaded-gaussians.js';
+import { limited } from '../gpu/open-scene.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { SourceEntry } from '../source-entry.js';
 import type { Stage } from '../stage.js';
 import { MeshLayer } from './mesh-layer.js';
-import { openModel } from './open-mesh.js';
+import { fetchMesh, openModel } from './open-mesh.js';
 
 /** A mesh where it is drawn. */
 export interface PlacedModel {
@@ -45,7 +46,7 @@ export class Meshes {
     return this.#models.map(({ model }) => model.version).join();
   }
 
-  /** Makes what draws on a device: once, whoever asks. */
+  /** Makes the layer of a device, once. */
   prepare({ device }: LoadedGaussians): Promise<void> {
     const prepare = async (): Promise<void> => {
       if (this.#layer?.device === device) return;
@@ -58,16 +59,20 @@ export class Meshes {
     return prepared;
   }
 
-  /** Fetches those of a file that has splats, too. @returns false where the splats are gone meanwhile */
-  async add({ attributes, services, scene: { url } }: SourceEntry, scene: LoadedGaussians): Promise<boolean> {
-    const { signal } = new AbortController();
+  /** Fetches the triangles of a file that has splats, too. Rejects with the signal's reason if the splats are gone meanwhile. */
+  async add(
+    { attributes, services, memoryBudget, scene: { url } }: SourceEntry,
+    scene: LoadedGaussians,
+  ): Promise<void> {
+    const { signal } = scene;
     const request = { url, credentials: credentialsOf(attributes.crossorigin), limits: services.sceneLimits };
-    const frameUrl = (beside: string): string => services.urlModifier?.(beside) ?? beside;
-    const model = await openModel(request, { loader: services.sceneLoader, signal, frameUrl });
+    const mesh = await fetchMesh(services.sceneLoader, limited(request, { memoryBudget }), signal);
+    for (const warning of mesh.warnings) this.#stage.warn(`<gaussian-splat>: ${warning}`);
+    const model = await openModel(mesh, url, { device: scene.device, signal, memoryBudget });
     await this.prepare(scene);
-    if (scene.isDestroyed) model.dispose();
-    else scene.model = model;
-    return !scene.isDestroyed;
+    if (signal.aborted) model.dispose();
+    signal.throwIfAborted();
+    scene.model = model;
   }
 
   /** Draws them into a frame. @returns where splats are drawn over them */

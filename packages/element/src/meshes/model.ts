@@ -1,38 +1,26 @@
 import { GaussianSplatError, type Bounds, type Vector3 } from '@gaussian-splat/core';
+import type { Reservation } from '@gaussian-splat/renderer';
+import type { LoadedMesh } from '../loading/protocol.js';
+import { unpackedViews } from './unpack.js';
 import {
   AnimationMixer,
   Box3,
   GLTFLoader,
-  LoadingManager,
-  loadMeshoptDecoder,
   type GLTFParser,
   type Group,
   type Material,
   type Mesh,
   type Object3D,
-  type Texture,
+  Texture,
 } from './three.js';
 
-/** Splats in a glTF: the renderer of splats shows them. */
-const SPLATS = 'KHR_gaussian_splatting';
 /** Just before the end: at the end itself an animation begins anew. */
 const BEFORE_END = 1e-4;
-/** Of a texture with all of its smaller levels, bytes a pixel. */
-const TEXEL_BYTES = (4 * 4) / 3;
-
-export interface ModelRequest {
-  /** Absolute address, for messages and for the files beside it. */
-  readonly url: string;
-  readonly credentials: RequestCredentials;
-  /** Address of a file beside it as it is fetched. */
-  readonly partUrl: (url: string) => string;
-}
-
 /** The triangles of a glTF, as three.js has them. */
 export class Model {
   readonly root: Group;
   readonly triangles: number;
-  /** Bytes of geometry and textures. */
+  /** Bytes of GPU memory of geometry and textures. */
   readonly byteLength: number;
   /** In its own frame, y up. */
   readonly bounds: Bounds;
@@ -44,9 +32,14 @@ export class Model {
   version = 0;
   readonly #mixer: AnimationMixer | undefined;
   readonly #meshes: readonly Mesh[];
+  readonly #reservation: Reservation;
 
-  private constructor(root: Group, animations: Awaited<ReturnType<GLTFLoader['parseAsync']>>['animations']) {
+  private constructor(
+    { scene: root, animations }: Awaited<ReturnType<GLTFLoader['parseAsync']>>,
+    reservation: Reservation,
+  ) {
     this.root = root;
+    this.#reservation = reservation;
     const meshes: Mesh[] = [];
     let lights = 0;
     root.traverse((object) => {
@@ -58,7 +51,7 @@ export class Model {
     this.triangles = meshes.reduce((sum, { geometry: { index, attributes } }) => {
       return sum + Math.floor((index ?? attributes.position)?.count / 3 || 0);
     }, 0);
-    this.byteLength = this.#countBytes();
+    this.byteLength = reservation.bytes;
     this.bounds = boundsOf(root);
     this.duration = animations.length > 0 ? Math.max(...animations.map(({ duration }) => duration)) : NaN;
     if (animations.length === 0) return;
@@ -70,24 +63,21 @@ export class Model {
   }
 
   /**
-   * Reads a glTF or GLB.
+   * Makes objects of a file that has been checked: the loader of three.js finds all buffer views and images in its cache, and fetches nothing.
+   * @param url for messages
+   * @param reservation its GPU memory, which is given back with the model, or when this rejects
    * @throws GaussianSplatError `decode/*`
    */
-  static async read(bytes: ArrayBuffer, { url, credentials, partUrl }: ModelRequest): Promise<Model> {
-    const loader = new GLTFLoader(
-      new LoadingManager().setURLModifier((part) => (/^(blob|data):/.test(part) ? part : partUrl(part))),
-    );
-    loader.setWithCredentials(credentials === 'include');
-    loader.register((parser) => ({ name: 'without-splats', beforeRoot: () => prepare(loader, parser) }));
+  static async read(mesh: LoadedMesh, url: string, reservation: Reservation): Promise<Model> {
     try {
-      const { scene, animations } = await loader.parseAsync(
-        bytes,
-        new URL('.', url.replace(/^blob:.*/, document.baseURI)).href,
-      );
-      return new Model(scene, animations);
+      const views = await unpackedViews(mesh.views, url);
+      const loader = new GLTFLoader();
+      loader.register((parser) => ({ name: 'checked', beforeRoot: () => fill(parser, views, mesh.images) }));
+      // Typed as a file, but the loader takes JSON as well.
+      return new Model(await loader.parseAsync(mesh.json, ''), reservation);
     } catch (error) {
-      if (error instanceof GaussianSplatError) throw error;
-      throw unreadable(url, error);
+      reservation.release();
+      throw error instanceof GaussianSplatError ? error : unreadable(url, error);
     }
   }
 
@@ -117,16 +107,7 @@ export class Model {
       }
       material.dispose();
     }
-  }
-
-  #countBytes(): number {
-    const geometries = new Set(this.#meshes.map(({ geometry }) => geometry));
-    const textures = new Set(this.materials.flatMap(texturesOf));
-    let bytes = 0;
-    for (const { index, attributes } of geometries)
-      for (const each of [index, ...Object.values(attributes)]) bytes += each?.array?.byteLength ?? 0;
-    for (const { image } of textures) bytes += (image?.width ?? 0) * (image?.height ?? 0) * TEXEL_BYTES;
-    return Math.round(bytes);
+    this.#reservation.release();
   }
 }
 
@@ -137,12 +118,19 @@ const texturesOf = (material: Material): Texture[] =>
     (value): value is Texture => value !== null && typeof value === 'object' && 'isTexture' in value,
   );
 
-/** Leaves out the primitives that hold splats, and fetches what compressed ones need. */
-async function prepare(loader: GLTFLoader, { json }: GLTFParser): Promise<void> {
-  for (const mesh of json.meshes ?? [])
-    mesh.primitives = mesh.primitives.filter(({ extensions }) => !Object.hasOwn(extensions ?? {}, SPLATS));
-  if (!json.extensionsUsed?.includes('EXT_meshopt_compression')) return;
-  loader.setMeshoptDecoder(await loadMeshoptDecoder());
+/** Puts the bytes of a file where the loader looks before it fetches. */
+async function fill(
+  { cache, sourceCache }: GLTFParser,
+  views: readonly (ArrayBuffer | undefined)[],
+  images: LoadedMesh['images'],
+): Promise<void> {
+  for (const [index, view] of views.entries()) if (view) cache.add(`bufferView:${index}`, Promise.resolve(view));
+  for (const [index, image] of images.entries()) {
+    if (!image) continue;
+    const texture = new Texture(image);
+    texture.needsUpdate = true;
+    sourceCache[index] = Promise.resolve(texture);
+  }
 }
 
 function boundsOf(root: Group): Bounds {
@@ -161,6 +149,6 @@ const unreadable = (where: string, cause: unknown): GaussianSplatError =>
     where,
     expected: 'a glTF 2.0 or GLB file with triangles',
     found: cause instanceof Error ? cause.message : String(cause),
-    remedy: 'open the file in a glTF validator; Draco and KTX2 are not read: meshopt and PNG, JPEG or WebP are',
+    remedy: 'open the file in a glTF validator',
     cause,
   });

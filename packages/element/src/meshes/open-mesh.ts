@@ -1,53 +1,79 @@
 /** Loaded when an element has meshes: three.js is behind this module. */
-import type { GaussianScene } from '@gaussian-splat/renderer';
+import { MemoryLedger, type GaussianScene } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { OpenOptions } from '../gpu/open-scene.js';
+import { limitScenes } from '../gpu/memory-budget.js';
+import { limited, type OpenOptions } from '../gpu/open-scene.js';
 import { assertWebGpu } from '../gpu/request-device.js';
 import type { Timeline } from '../live/live-model.js';
-import type { SceneRequest } from '../loading/protocol.js';
+import type { FileRequest, LoadedMesh, SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
 import { Model } from './model.js';
 
-type Options = Pick<OpenOptions, 'loader' | 'signal' | 'frameUrl'>;
+/** Fetches a glTF and the files that it names, and checks them. Rejects with GaussianSplatError, or the signal's reason. */
+export function fetchMesh(
+  loader: SceneLoader,
+  { url, credentials, limits }: FileRequest,
+  signal: AbortSignal,
+  onProgress?: OpenOptions['onProgress'],
+): Promise<LoadedMesh> {
+  const request = { url, credentials, limits };
+  return loader.ask(
+    { type: 'mesh', request },
+    signal,
+    ({ openMeshFile }) => openMeshFile(request, signal, onProgress),
+    { onProgress },
+  );
+}
 
-/** Fetches and reads a glTF. Rejects with GaussianSplatError, or the signal's reason. */
+/**
+ * Reserves the GPU memory that a mesh takes, and makes its objects. Rejects with GaussianSplatError, or the signal's reason.
+ * @param most bytes that it may take; undefined for no limit but the device's
+ */
 export async function openModel(
-  { url, credentials, limits }: Pick<SceneRequest, 'url' | 'credentials' | 'limits'>,
-  { loader, signal, frameUrl }: Options,
+  mesh: LoadedMesh,
+  url: string,
+  { device, signal, memoryBudget }: { device: GPUDevice; signal: AbortSignal; memoryBudget: number | undefined },
 ): Promise<Model> {
-  const bytes = await loader.fetchFile({ url, credentials, limits }, signal);
-  signal.throwIfAborted();
-  const model = await Model.read(bytes, { url, credentials, partUrl: frameUrl });
-  if (!signal.aborted) return model;
-  model.dispose();
-  throw signal.reason;
+  const { byteLength } = mesh;
+  try {
+    signal.throwIfAborted();
+    limitScenes(device, memoryBudget);
+    const reservation = MemoryLedger.of(device).reserve(`mesh ${url.slice(0, 200)}`, byteLength, memoryBudget);
+    const model = await Model.read(mesh, url, reservation);
+    if (!signal.aborted) return model;
+    model.dispose();
+    throw signal.reason;
+  } catch (error) {
+    for (const image of mesh.images) image?.close();
+    throw error;
+  }
 }
 
 /** Opens a mesh as a source that has no splats, so that its life is that of all sources. */
 export async function openMesh(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   await assertWebGpu();
-  const { device, signal, onProgress, live: liveRequest, submissions } = options;
+  const { device, signal, onProgress, live: liveRequest, submissions, beforeUpload, loader } = options;
   const acquiring = device.acquire();
   acquiring.catch(() => undefined);
-  const model = await openModel(request, options).catch((error: unknown) => {
-    void acquiring.then((lease) => lease.release());
+  try {
+    const mesh = await fetchMesh(loader, limited(request, options), signal, onProgress);
+    const lease = await acquiring;
+    beforeUpload(mesh.byteLength);
+    const model = await openModel(mesh, request.url, { ...options, device: lease.device });
+    const { onShown } = liveRequest().listeners;
+    const live: Timeline | undefined = Number.isNaN(model.duration) ? undefined : timelineOf(model, onShown);
+    const bounds = { ...model.bounds, up: [0, 1, 0] as const };
+    const { warnings } = mesh;
+    const loaded = new LoadedGaussians(lease, noSplats(), bounds, submissions, { live, warnings });
+    loaded.model = model;
+    return loaded;
+  } catch (error) {
+    acquiring.then(
+      (lease) => lease.release(),
+      () => undefined,
+    );
     throw error;
-  });
-  const lease = await acquiring.catch((error: unknown) => {
-    model.dispose();
-    throw error;
-  });
-  if (signal.aborted) {
-    lease.release();
-    model.dispose();
-    throw signal.reason;
   }
-  onProgress(1, 1);
-  const { onShown } = liveRequest().listeners;
-  const live: Timeline | undefined = Number.isNaN(model.duration) ? undefined : timelineOf(model, onShown);
-  const bounds = { ...model.bounds, up: [0, 1, 0] as const };
-  const loaded = new LoadedGaussians(lease, noSplats(), bounds, submissions, { live });
-  loaded.model = model;
-  return loaded;
 }
 
 /** The animations of a model as what moves a scene. */

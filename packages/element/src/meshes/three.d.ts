@@ -47,6 +47,8 @@ export class Camera extends Object3D {
   _reversedDepth: boolean;
 }
 export class Texture {
+  constructor(image?: ImageBitmap);
+  needsUpdate: boolean;
   image?: { readonly width?: number; readonly height?: number; close?: () => void };
   dispose(): void;
 }
@@ -111,9 +113,6 @@ export class AnimationMixer {
   stopAllAction(): void;
   uncacheRoot(root: Object3D): void;
 }
-export class LoadingManager {
-  setURLModifier(modifier: (url: string) => string): this;
-}
 export class PMREMGenerator {
   constructor(renderer: WebGPURenderer);
   fromScene(
@@ -133,7 +132,7 @@ export class WebGPURenderer {
   setClearColor(color: number, alpha: number): void;
   autoClearDepth: boolean;
   render(scene: Scene, camera: Camera): void;
-  compileAsync(scene: Scene, camera: Camera): Promise<unknown>;
+  compileAsync(root: Object3D, camera: Camera, scene: Scene): Promise<unknown>;
   dispose(): unknown;
   onDeviceLost: (info: unknown) => void;
   onError: (info: { readonly originalEvent?: Event }) => void;
@@ -143,24 +142,31 @@ export const HalfFloatType: number;
 export const WebGPUCoordinateSystem: number;
 
 export interface GLTFParser {
-  readonly json: {
-    readonly extensionsUsed?: readonly string[];
-    readonly meshes?: readonly { primitives: readonly { readonly extensions?: object }[] }[];
-  };
+  /** Buffer views, accessors and so on, by type and number. */
+  readonly cache: { add(key: string, value: Promise<unknown>): void };
+  /** Textures of images, by number. */
+  readonly sourceCache: Record<number, Promise<Texture>>;
 }
 export class GLTFLoader {
-  constructor(manager?: LoadingManager);
   register(plugin: (parser: GLTFParser) => { readonly name: string; beforeRoot?(): Promise<void> | null }): this;
-  setCrossOrigin(value: string): this;
-  setWithCredentials(value: boolean): this;
-  setMeshoptDecoder(decoder: unknown): this;
   parseAsync(
-    data: ArrayBuffer,
+    data: object,
     path: string,
-  ): Promise<{ readonly scene: Group; readonly animations: readonly AnimationClip[]; readonly parser: GLTFParser }>;
+  ): Promise<{ readonly scene: Group; readonly animations: readonly AnimationClip[] }>;
 }
 
-export const loadMeshoptDecoder: () => Promise<unknown>;
+export interface MeshoptDecoder {
+  /** Rejects if WebAssembly is forbidden; absent if there is none. */
+  readonly ready?: Promise<void>;
+  decodeGltfBufferAsync(
+    count: number,
+    stride: number,
+    source: Uint8Array,
+    mode: string,
+    filter: string | undefined,
+  ): Promise<Uint8Array<ArrayBuffer>>;
+}
+export const loadMeshoptDecoder: () => Promise<MeshoptDecoder>;
 
 export class RoomEnvironment extends Scene {
   dispose(): void;

@@ -24,8 +24,11 @@ const HEADER_BYTES = 12;
 const HARMLESS =
   /^(KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))|^KHR_gaussian_splatting(_compression_spz(_2)?)?$/;
 
-/** Takes a GLB, or a glTF in JSON, apart. Throws `decode/unsupported` where it requires what is not known here, as glTF asks of readers. */
-export function openContainer(source: JsonSource): GltfFile {
+/**
+ * Takes a GLB, or a glTF in JSON, apart. Throws `decode/unsupported` where it requires what is not known here, as glTF asks of readers.
+ * @param known extensions that a file may require
+ */
+export function openContainer(source: JsonSource, known = HARMLESS): GltfFile {
   const { bytes, name } = source;
   const file = startsWith(bytes, 'glTF')
     ? openGlb(source)
@@ -37,7 +40,7 @@ export function openContainer(source: JsonSource): GltfFile {
     throw damaged(`${name}, asset.version`, 'glTF 2.x', show(version), 'decode/unsupported');
   }
   const unknown: unknown = Array.isArray(extensionsRequired)
-    ? extensionsRequired.find((extension) => typeof extension !== 'string' || !HARMLESS.test(extension))
+    ? extensionsRequired.find((extension) => typeof extension !== 'string' || !known.test(extension))
     : undefined;
   if (unknown !== undefined) {
     throw new GaussianSplatError('decode/unsupported', {

@@ -41,23 +41,33 @@ export interface AccessorData {
   readonly values: Float32Array;
 }
 
+/** Fetches a file by the address that a glTF has for it, relative or absolute. */
+export type OpenUri = (uri: string) => Promise<Uint8Array>;
+
 /** Access to the parts of a glTF file by number, every one checked before it is used. */
 export class GltfDocument {
   readonly json: Json;
   readonly name: string;
   readonly budget: LoadBudget;
   readonly #binary: Uint8Array | undefined;
-  readonly #open: OpenPart;
+  readonly #open: OpenPart | undefined;
+  readonly #openUri: OpenUri | undefined;
   readonly #buffers = new Map<number, Promise<Uint8Array>>();
   /** Each is fetched once, however many buffers name it. */
   readonly #files = new Map<string, Promise<Uint8Array>>();
 
-  constructor({ json, binary }: GltfFile, { name, budget }: Pick<SceneSource, 'name' | 'budget'>, open: OpenPart) {
+  /** @param open opens files beside it by their paths, or any file by its address */
+  constructor(
+    { json, binary }: GltfFile,
+    { name, budget }: Pick<SceneSource, 'name' | 'budget'>,
+    open: { readonly part: OpenPart } | { readonly uri: OpenUri },
+  ) {
     this.json = json;
     this.name = name;
     this.budget = budget;
     this.#binary = binary;
-    this.#open = open;
+    this.#open = 'part' in open ? open.part : undefined;
+    this.#openUri = 'uri' in open ? open.uri : undefined;
   }
 
   /** Throws `decode/header`. */
@@ -176,9 +186,11 @@ export class GltfDocument {
 
   /** The bytes of a buffer view. */
   async readView(index: unknown): Promise<Uint8Array> {
-    const view = this.item('bufferViews', index);
-    const { buffer, byteOffset = 0, byteLength } = view;
-    const path = `bufferViews[${String(index)}]`;
+    return this.readRange(this.item('bufferViews', index), `bufferViews[${String(index)}]`);
+  }
+
+  /** The bytes of a part of a buffer. */
+  async readRange({ buffer, byteOffset = 0, byteLength }: Json, path: string): Promise<Uint8Array> {
     if (!this.isIndex(buffer) || !this.isIndex(byteOffset) || !this.isIndex(byteLength)) {
       return this.fail(path, 'a buffer, an offset and a length', { buffer, byteOffset, byteLength });
     }
@@ -202,28 +214,32 @@ export class GltfDocument {
       if (index === 0 && this.#binary) return this.#binary;
       return this.fail(`buffers[${index}]`, 'an address, or the binary chunk of a GLB', uri);
     }
-    if (typeof uri !== 'string') return this.fail(`buffers[${index}].uri`, 'an address', uri);
-    if (/^data:/i.test(uri)) return this.#decodeDataUri(uri, index);
-    if (/^([a-z][a-z0-9+.-]*:|\/\/)/i.test(uri)) {
+    return this.readUri(uri, `buffers[${index}].uri`);
+  }
+
+  /** The bytes at an address that the file has; each address is fetched once. */
+  async readUri(uri: unknown, path: string): Promise<Uint8Array> {
+    if (typeof uri !== 'string') return this.fail(path, 'an address', uri);
+    if (/^data:/i.test(uri)) return this.#decodeDataUri(uri, path);
+    if (!this.#openUri && /^([a-z][a-z0-9+.-]*:|\/\/)/i.test(uri)) {
       const expected = 'a relative address: a file beside the scene, or "data:"';
-      throw damaged(`${this.name}, buffers[${index}].uri`, expected, show(uri), 'decode/unsupported');
+      throw damaged(`${this.name}, ${path}`, expected, show(uri), 'decode/unsupported');
     }
     // What follows the path is for servers; the file that lies beside the scene is found without.
     const [, file, query] = /^([^?#]*)(\?[^#]*)?/.exec(uri)!;
-    const path = decodeSafely(file);
-    const found = this.#files.get(uri) ?? this.#open(path, query);
+    const found = this.#files.get(uri) ?? this.#openUri?.(uri) ?? this.#open!(decodeSafely(file), query);
     this.#files.set(uri, found);
-    return checkedPart(await found, `${this.name}, ${path}`);
+    return checkedPart(await found, `${this.name}, ${decodeSafely(file).slice(0, 200)}`);
   }
 
-  #decodeDataUri(uri: string, index: number): Uint8Array {
+  #decodeDataUri(uri: string, path: string): Uint8Array {
     const match = /^data:[^,]*;base64,/i.exec(uri.slice(0, 200));
     try {
       if (match) return bytesOf(atob(uri.slice(match[0].length)));
     } catch {
       // Said below.
     }
-    return this.fail(`buffers[${index}].uri`, 'base64', uri.slice(0, 40));
+    return this.fail(path, 'base64', uri.slice(0, 40));
   }
 }
 

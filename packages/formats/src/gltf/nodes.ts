@@ -20,6 +20,17 @@ const MAX_DEPTH = 1_000;
 /** The meshes of the default scene (of all nodes where there is none), each with the product of its nodes' transforms. */
 export function placedMeshes(document: GltfDocument): PlacedMesh[] {
   const placed: PlacedMesh[] = [];
+  walkNodes(document, (json, toScene) => {
+    if (document.isIndex(json.mesh)) placed.push({ mesh: json.mesh, toScene });
+  });
+  return placed;
+}
+
+/**
+ * Visits each node of the default scene (of all nodes if there is none), as often as the scene shows it. Throws `decode/header` if that is more than 10,000 times, or deeper than 1,000.
+ * @param visit called with the node, the product of its and its parents' transforms, and its number
+ */
+export function walkNodes(document: GltfDocument, visit: (node: Json, toScene: Affine, index: number) => void): void {
   // Lists of nodes, and how far each has been followed: nodes may name the same long list again and again.
   const open = [{ nodes: rootNodes(document), next: 0, parent: IDENTITY }];
   for (let visited = 0; open.length > 0;) {
@@ -30,15 +41,16 @@ export function placedMeshes(document: GltfDocument): PlacedMesh[] {
     }
     if (visited++ > MAX_PLACES) document.fail('nodes', `at most ${MAX_PLACES} nodes`, 'more');
     if (open.length > MAX_DEPTH) document.fail('nodes', 'a tree', 'nodes that contain themselves');
-    const json = document.item('nodes', list.nodes[list.next++]);
+    const index = list.nodes[list.next++];
+    const json = document.item('nodes', index);
     const toScene = multiply(list.parent, localTransform(json, document));
-    if (document.isIndex(json.mesh)) placed.push({ mesh: json.mesh, toScene });
+    visit(json, toScene, index as number);
     if (Array.isArray(json.children)) open.push({ nodes: json.children, next: 0, parent: toScene });
   }
-  return placed;
 }
 
-function rootNodes(document: GltfDocument): unknown[] {
+/** The nodes that have no parent in the default scene, or in the file if there is none. */
+export function rootNodes(document: GltfDocument): unknown[] {
   const { scenes, scene = 0, nodes } = document.json;
   if (Array.isArray(scenes) && scenes.length > 0) {
     const { nodes: roots } = document.item('scenes', scene);

@@ -2,10 +2,12 @@ import { LoadBudget, type LoadLimits } from '../budget.js';
 import { grouped } from '../bytes.js';
 import { damaged } from '../faults.js';
 import { partAddress } from '../fetch-scene.js';
-import { parseLodMeta } from './meta.js';
+import { parseLodMeta, type LodRun } from './meta.js';
 
 /** Splats `first` to `first + count` of one SOG file of a streamed scene. */
 export interface SogRun extends SogAddress {
+  /** Number of the file: see {@link LodScene.files}. */
+  readonly file: number;
   readonly first: number;
   readonly count: number;
 }
@@ -30,12 +32,16 @@ export interface LodBox {
 /** A streamed SOG scene, of which no splat has been read. */
 export interface LodScene {
   readonly boxes: readonly LodBox[];
+  /** Paths of all files, relative to the index. */
+  readonly files: readonly string[];
   /** Splats that are always shown, if there are any. */
   readonly environment: SogAddress | undefined;
 }
 
 /** Splats of all levels together that an index may name. */
 const MOST_SPLATS = 2 ** 31;
+/** Charged for each file: its addresses, and the parsing of them. */
+const FILE_BYTES = 512;
 /** What is allocated for each before any is there: bounds and state of each 256. */
 const KEPT_BYTES = 32 / 256;
 
@@ -48,13 +54,11 @@ const KEPT_BYTES = 32 / 256;
 export function readLodScene(bytes: Uint8Array, name: string, url: string, limits?: LoadLimits): LodScene {
   const budget = new LoadBudget(bytes.length, limits);
   const { files, leaves, environment } = parseLodMeta({ bytes, name, budget });
-  const addressOf = (path: string): SogAddress => ({ url: partAddress(url, path).href, name: `${name}, ${path}` });
-  const addresses = files.map(addressOf);
+  budget.take(files.length * (FILE_BYTES + url.length), name);
+  const addresses = files.map((path) => sogAddress(path, name, url));
   const boxes = leaves.map(({ min, max, levels }) => ({
     ...{ min, max },
-    runs: levels
-      .flatMap((run) => (run && run.count > 0 ? { ...addresses[run.file], first: run.offset, count: run.count } : []))
-      .reverse(),
+    runs: levels.flatMap((run) => (run && run.count > 0 ? { ...addresses[run.file], ...placeOf(run) } : [])).reverse(),
   }));
   const total = boxes.reduce((sum, { runs }) => runs.reduce((own, { count }) => own + count, sum), 0);
   if (total > MOST_SPLATS) {
@@ -63,6 +67,24 @@ export function readLodScene(bytes: Uint8Array, name: string, url: string, limit
   budget.take(total * KEPT_BYTES, name);
   return {
     boxes: boxes.filter(({ runs }) => runs.length > 0),
-    environment: environment === undefined ? undefined : addressOf(environment),
+    files,
+    environment: environment === undefined ? undefined : sogAddress(environment, name, url),
   };
 }
+
+const placeOf = ({ file, offset, count }: LodRun): Pick<SogRun, 'file' | 'first' | 'count'> => ({
+  file,
+  first: offset,
+  count,
+});
+
+/**
+ * A file of a streamed scene.
+ * @param path relative to the index
+ * @param name what error messages call the index
+ * @param url absolute address of the index
+ */
+export const sogAddress = (path: string, name: string, url: string): SogAddress => ({
+  url: partAddress(url, path).href,
+  name: `${name}, ${path}`,
+});

@@ -31,6 +31,8 @@ export interface LodMeta {
 
 /** An index takes some 100 bytes for each leaf and level. */
 export const MAX_INDEX_BYTES = 1 << 26;
+/** Characters of a path: servers refuse longer addresses. */
+const MAX_PATH = 2048;
 const MAX_LEVELS = 64;
 
 /**
@@ -50,6 +52,9 @@ export function parseLodMeta(source: JsonSource): LodMeta {
   if (!Array.isArray(filenames) || !filenames.every((file) => typeof file === 'string' && file !== '')) {
     return fail('filenames', 'paths of SOG descriptions', filenames);
   }
+  const isLong = (path: unknown): boolean => typeof path === 'string' && path.length > MAX_PATH;
+  if ([...filenames, environment].some(isLong))
+    fail('filenames', `paths of at most ${grouped(MAX_PATH)} characters`, 'longer ones');
   if (environment !== undefined && environment !== null && typeof environment !== 'string') {
     fail('environment', 'a path or nothing', environment);
   }

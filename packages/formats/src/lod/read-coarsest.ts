@@ -7,7 +7,7 @@ import { cut, type FetchBytes, type SogFiles } from './sog-files.js';
 
 /**
  * The coarsest run of each box of a streamed scene, with its environment: the nodes of `levelRuns` are the numbers of the boxes, and behind them the environment. Splats
- * that cannot be drawn are left out; of a box none may be left.
+ * that cannot be drawn are left out; of a box none may be left. All files are charged to one account.
  * @throws GaussianSplatError as `SogFiles.read`
  */
 export async function readCoarsest(
@@ -29,11 +29,7 @@ export async function readCoarsest(
   // Where one file is missing the others are not waited for.
   const failed = new AbortController();
   const either = AbortSignal.any([failed.signal, ...(signal ? [signal] : [])]);
-  const openFile = async (file: SogAddress): Promise<GaussianCloud> => {
-    const cloud = await files.open(file, fetch, either);
-    budget.arrive(files.arrivedBytes(cloud));
-    return cloud;
-  };
+  const openFile = (file: SogAddress): Promise<GaussianCloud> => files.open(file, fetch, either, budget);
   const readFile = async (runs: readonly [number, SogRun][]): Promise<void> => {
     const cloud = await openFile(runs[0][1]);
     for (const [node, run] of runs) {

@@ -19,6 +19,8 @@ const FILES_AT_A_TIME = 2;
 interface Reading {
   readonly cloud: Promise<GaussianCloud>;
   readonly controller: AbortController;
+  /** The account that it is charged to. */
+  readonly budget: LoadBudget | undefined;
   readers: number;
 }
 
@@ -43,11 +45,17 @@ export class SogFiles {
   /**
    * Reads the splats of a run, those left out that cannot be drawn.
    * @param fetch brings the files that are not here
+   * @param budget the account of the scene; without it each file has its own
    * @throws GaussianSplatError `decode/*`, `decode/corrupt` for a run that reaches beyond its file, `decode/empty` for one without a splat that can be drawn, `out-of-memory/budget`; what `fetch` throws; the
    * reason of `signal` as soon as that is aborted.
    */
-  async read(run: SogRun, fetch: FetchBytes, signal?: AbortSignal): Promise<GaussianCloud> {
-    const cloud = keepUsable(cut(await this.open(run, fetch, signal), run));
+  async read(
+    run: Omit<SogRun, 'file'>,
+    fetch: FetchBytes,
+    signal?: AbortSignal,
+    budget?: LoadBudget,
+  ): Promise<GaussianCloud> {
+    const cloud = keepUsable(cut(await this.open(run, fetch, signal, budget), run));
     if (cloud.count > 0) return cloud;
     throw new GaussianSplatError('decode/empty', {
       where: whereOf(run),
@@ -58,25 +66,24 @@ export class SogFiles {
   }
 
   /** All splats of a file, in its order; not to be changed. Throws as {@link read} does. */
-  async open(file: SogAddress, fetch: FetchBytes, signal?: AbortSignal): Promise<GaussianCloud> {
+  async open(file: SogAddress, fetch: FetchBytes, signal?: AbortSignal, budget?: LoadBudget): Promise<GaussianCloud> {
     signal?.throwIfAborted();
     const kept = this.#kept.get(file.url);
     if (kept) {
       this.#keep(file.url, kept);
+      // It costs nothing more, but what is taken of it is charged.
+      budget?.arrive(this.#arrived.get(kept) ?? 0);
       return kept;
     }
     let reading = this.#reading.get(file.url);
-    if (reading === undefined) {
+    // One that another scene reads ends by the budget of that scene.
+    if (reading === undefined || reading.budget !== budget) {
       const controller = new AbortController();
-      reading = { cloud: this.#read(file, fetch, controller.signal), controller, readers: 0 };
+      const cloud = this.#read(file, fetch, controller.signal, budget);
+      reading = { cloud, controller, budget, readers: 0 };
       this.#reading.set(file.url, reading);
     }
     return this.#wait(file.url, reading, signal);
-  }
-
-  /** Bytes that a file arrived as, which {@link open} has given. */
-  arrivedBytes(cloud: GaussianCloud): number {
-    return this.#arrived.get(cloud) ?? 0;
   }
 
   /** Waits with others for a file; the last that gives up ends its reading. */
@@ -100,19 +107,28 @@ export class SogFiles {
     }
   }
 
-  async #read({ url, name }: SogAddress, fetch: FetchBytes, signal: AbortSignal): Promise<GaussianCloud> {
+  async #read(
+    { url, name }: SogAddress,
+    fetch: FetchBytes,
+    signal: AbortSignal,
+    shared: LoadBudget | undefined,
+  ): Promise<GaussianCloud> {
     const leave = await this.#gate.enter();
     try {
       signal.throwIfAborted();
       const bytes = await checkedPart(await fetch(url, signal), name);
-      const budget = new LoadBudget(bytes.length);
-      const open = async (path: string): Promise<Uint8Array> => {
-        const part = await fetch(partAddress(url, path).href, signal);
+      const budget = shared ?? new LoadBudget(0);
+      let arrived = 0;
+      const arrive = (part: Uint8Array): Uint8Array => {
+        arrived += part.length;
         budget.arrive(part.length);
         return part;
       };
+      arrive(bytes);
+      const open = async (path: string): Promise<Uint8Array> =>
+        arrive(await fetch(partAddress(url, path).href, signal));
       const cloud = await readSogPart({ bytes, name, budget, signal }, open);
-      this.#arrived.set(cloud, budget.arrived);
+      this.#arrived.set(cloud, arrived);
       this.#keep(url, cloud);
       return cloud;
     } finally {
@@ -133,7 +149,7 @@ export class SogFiles {
   }
 }
 
-const whereOf = ({ name, first, count }: SogRun): string =>
+const whereOf = ({ name, first, count }: Omit<SogRun, 'file'>): string =>
   `${name}, splats ${grouped(first)} to ${grouped(first + count)}`;
 
 const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianCloud): number =>
@@ -144,7 +160,7 @@ const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianC
  * @param budget is charged for them
  * @throws GaussianSplatError `decode/corrupt` if the cloud has not as many
  */
-export function cut(cloud: GaussianCloud, run: SogRun, budget?: LoadBudget): GaussianCloud {
+export function cut(cloud: GaussianCloud, run: Omit<SogRun, 'file'>, budget?: LoadBudget): GaussianCloud {
   const { first, count, name } = run;
   if (first + count > cloud.count) {
     throw damaged(

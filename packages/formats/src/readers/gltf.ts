@@ -153,7 +153,7 @@ function open({ bytes, name, openPart, budget }: SceneSource): {
   const document = new GltfDocument(
     openContainer({ bytes, name, budget }),
     { name, budget },
-    openPart ?? noParts(name, 'scene.glb'),
+    { part: openPart ?? noParts(name, 'scene.glb') },
   );
   const placed: PlacedSplats[] = [];
   const known = new Map<number, MeshParts>();

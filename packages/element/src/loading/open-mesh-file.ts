@@ -1,0 +1,76 @@
+/** Loaded by the worker when the first mesh is asked for. */
+import { GaussianSplatError, partRequest } from '@gaussian-splat/core';
+import { fetchScene, LoadBudget, readTriangles, type ImageFile, type TriangleFile } from '@gaussian-splat/formats';
+import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
+import { ProgressSum } from './progress-sum.js';
+import type { FileRequest, LoadedMesh, ProgressListener } from './protocol.js';
+
+/**
+ * Fetches a glTF and the files that it names, checks what it costs, and decodes its images. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's
+ * reason once that is aborted.
+ */
+export async function openMeshFile(
+  request: FileRequest,
+  signal: AbortSignal,
+  onProgress: ProgressListener = () => undefined,
+): Promise<LoadedMesh> {
+  const { url, credentials } = request;
+  const name = fileName(url);
+  const limits = limitsFrom(request);
+  try {
+    const progress = new ProgressSum(throttled(onProgress), /\.gltf$/i.test(name));
+    const fetch = (part: Pick<FileRequest, 'url' | 'credentials'>): Promise<Uint8Array> =>
+      fetchScene(part.url, {
+        ...{ mode: 'cors', credentials: part.credentials, signal, onProgress: progress.add() },
+        ...fileLimits(limits()),
+      });
+    const bytes = await fetch({ url, credentials });
+    const budget = new LoadBudget(bytes.length, limits());
+    const openUri = async (uri: string): Promise<Uint8Array> => {
+      const part = await fetch(partRequest(uri, { url, credentials }, request.limits?.origins));
+      budget.arrive(part.length);
+      return part;
+    };
+    const file = await readTriangles({ bytes, name, budget, openUri });
+    signal.throwIfAborted();
+    return await withBitmaps(file, name, signal);
+  } catch (error) {
+    signal.throwIfAborted();
+    throw named(error, name);
+  }
+}
+
+async function withBitmaps(file: TriangleFile, name: string, signal: AbortSignal): Promise<LoadedMesh> {
+  const bitmaps: (ImageBitmap | undefined)[] = [];
+  try {
+    for (const [index, image] of file.images.entries()) {
+      bitmaps.push(image && (await decoded(image, `${name}, images[${index}]`)));
+      signal.throwIfAborted();
+    }
+  } catch (error) {
+    for (const bitmap of bitmaps) bitmap?.close();
+    throw error;
+  }
+  return { ...file, images: bitmaps };
+}
+
+/** As `GLTFLoader` decodes them: the values of the file, without a color profile. */
+async function decoded({ bytes, type, width, height }: ImageFile, where: string): Promise<ImageBitmap> {
+  const fail = (found: string, cause?: unknown): never => {
+    throw new GaussianSplatError('decode/corrupt', {
+      where,
+      expected: `an image of ${width} x ${height} pixels, as its header says`,
+      found,
+      remedy: 'export the file again; the image is damaged',
+      cause,
+    });
+  };
+  const options: ImageBitmapOptions = { premultiplyAlpha: 'none', colorSpaceConversion: 'none' };
+  const bitmap = await createImageBitmap(new Blob([bytes], { type }), options).catch((cause: unknown) =>
+    fail((cause as Error).message, cause),
+  );
+  if (bitmap.width === width && bitmap.height === height) return bitmap;
+  const found = `${bitmap.width} x ${bitmap.height}`;
+  bitmap.close();
+  return fail(found);
+}

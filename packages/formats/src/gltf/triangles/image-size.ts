@@ -1,0 +1,64 @@
+import { asciiOf, startsWith, viewOf } from '../../bytes.js';
+
+/** The header of an image file: its media type and its size in pixels. */
+export interface ImageHeader {
+  readonly type: 'image/png' | 'image/jpeg' | 'image/webp';
+  readonly width: number;
+  readonly height: number;
+}
+
+/** Reads the header of a PNG, JPEG or WebP image; undefined for other files and for headers without a size. */
+export function imageHeader(bytes: Uint8Array): ImageHeader | undefined {
+  const found = pngHeader(bytes) ?? jpegHeader(bytes) ?? webpHeader(bytes);
+  return found && found.width > 0 && found.height > 0 ? found : undefined;
+}
+
+function pngHeader(bytes: Uint8Array): ImageHeader | undefined {
+  if (
+    !startsWith(
+      bytes,
+      '\x89PNG\r\n\x1a\n'.split('').map((c) => c.charCodeAt(0)),
+    ) ||
+    bytes.length < 24
+  )
+    return undefined;
+  const view = viewOf(bytes);
+  return { type: 'image/png', width: view.getUint32(16), height: view.getUint32(20) };
+}
+
+/** Start-of-frame markers: C0 to CF without the tables (C4), the reserved one (C8) and arithmetic conditioning (CC). */
+const isFrame = (marker: number): boolean => marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker);
+
+function jpegHeader(bytes: Uint8Array): ImageHeader | undefined {
+  if (!startsWith(bytes, [0xff, 0xd8, 0xff])) return undefined;
+  const view = viewOf(bytes);
+  for (let at = 2; at + 9 <= bytes.length;) {
+    if (bytes[at] !== 0xff) return undefined;
+    const marker = bytes[at + 1];
+    if (isFrame(marker)) return { type: 'image/jpeg', width: view.getUint16(at + 7), height: view.getUint16(at + 5) };
+    // Fill bytes and markers without a segment.
+    if (marker === 0xff) at++;
+    else if (marker === 0x01 || (marker >= 0xd0 && marker <= 0xd8)) at += 2;
+    else at += 2 + Math.max(2, view.getUint16(at + 2));
+  }
+  return undefined;
+}
+
+function webpHeader(bytes: Uint8Array): ImageHeader | undefined {
+  if (!startsWith(bytes, 'RIFF') || !startsWith(bytes, 'WEBP', 8) || bytes.length < 30) return undefined;
+  const view = viewOf(bytes);
+  const uint24 = (at: number): number => view.getUint16(at, true) | (bytes[at + 2] << 16);
+  const type = 'image/webp';
+  switch (asciiOf(bytes, 12, 16)) {
+    case 'VP8X':
+      return { type, width: 1 + uint24(24), height: 1 + uint24(27) };
+    case 'VP8 ':
+      return { type, width: view.getUint16(26, true) & 0x3fff, height: view.getUint16(28, true) & 0x3fff };
+    case 'VP8L': {
+      const size = view.getUint32(21, true);
+      return { type, width: 1 + (size & 0x3fff), height: 1 + ((size >>> 14) & 0x3fff) };
+    }
+    default:
+      return undefined;
+  }
+}

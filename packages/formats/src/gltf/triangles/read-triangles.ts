@@ -1,0 +1,81 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { LoadBudget } from '../../budget.js';
+import { openContainer, type Json } from '../container.js';
+import { GltfDocument, type OpenUri } from '../document.js';
+import { Images, type ImageFile } from './images.js';
+import { Survey } from './survey.js';
+import { trimmed } from './trim.js';
+import { Views, type MeshoptView } from './views.js';
+
+/** A glTF file in memory, and the ways to the files that it names. */
+export interface TriangleSource {
+  readonly bytes: Uint8Array;
+  /** What error messages call the file. */
+  readonly name: string;
+  readonly budget: LoadBudget;
+  /**
+   * Fetches a file that the glTF names.
+   * @param uri as the glTF has it, relative or absolute; never `data:`
+   */
+  readonly openUri: OpenUri;
+}
+
+/** The triangles, points and lines of a glTF: JSON that names no file, and the bytes that it refers to. */
+export interface TriangleFile {
+  /**
+   * glTF 2.0 with one scene, without splats, cameras, names and extras. Its buffer views have neither buffers nor offsets: their bytes are in `views`. Its images have neither
+   * addresses nor views: they are in `images`.
+   */
+  readonly json: Json;
+  /** Bytes of each buffer view that is used, each in a buffer of its own. */
+  readonly views: readonly (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[];
+  /** Each image that is used, undecoded. */
+  readonly images: readonly (ImageFile | undefined)[];
+  /** GPU memory of geometry and textures, bytes. */
+  readonly byteLength: number;
+  /** Triangles that a frame draws. */
+  readonly triangles: number;
+  /** Sentences about the parts of the file that are not shown. */
+  readonly warnings: readonly string[];
+}
+
+/** Extensions that a file may require. Draco and KTX2 are not among them. */
+const KNOWN =
+  /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_transform|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_xmp\w*)$/;
+
+/**
+ * Reads the triangles of a glTF 2.0 or GLB file. Every number that a viewer allocates by is checked, and all that the file announces or names again is charged to the budget, before
+ * anything is decoded.
+ *
+ * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`, and the errors of `openUri`
+ */
+export async function readTriangles({ bytes, name, budget, openUri }: TriangleSource): Promise<TriangleFile> {
+  const file = openContainer({ bytes, name, budget }, KNOWN);
+  const document = new GltfDocument(file, { name, budget }, { uri: openUri });
+  const survey = new Survey(document);
+  if (survey.triangles === 0 && survey.meshes.size === 0) throw noTriangles(name);
+  const images = new Images(document, survey);
+  const views = new Views(document, survey);
+  const files = await images.read();
+  return {
+    json: trimmed(document, survey),
+    views: await views.read(),
+    images: files,
+    byteLength: views.byteLength + survey.copies + images.byteLength,
+    triangles: survey.triangles,
+    warnings: [...darkLights(survey.darkLights)],
+  };
+}
+
+function darkLights(count: number): string[] {
+  return count > 0 ? [`${count} lights of a mesh are left out: 16 are shown at most.`] : [];
+}
+
+const noTriangles = (name: string): GaussianSplatError =>
+  new GaussianSplatError('decode/empty', {
+    where: name,
+    expected: 'a scene with meshes',
+    found: 'none in the default scene of the file',
+    remedy:
+      'name the scene that shows meshes in "scene", or export the file again; splats are shown by src of <gaussian-splat>',
+  });

@@ -1,0 +1,71 @@
+import { isObject } from '../../json.js';
+import type { Json } from '../container.js';
+import type { GltfDocument } from '../document.js';
+import { rootNodes } from '../nodes.js';
+import { sourceOf } from './images.js';
+import type { Survey } from './survey.js';
+
+/** Extensions that the loader of three.js reads here. */
+const READ =
+  /^(KHR_materials_\w+|EXT_materials_\w+|KHR_lights_punctual|KHR_texture_transform|KHR_mesh_quantization|EXT_mesh_gpu_instancing)$/;
+
+/** The JSON of a glTF with nothing in it but what its scene uses. Names and extras are left out: a name is copied for each channel of an animation. */
+export function trimmed(document: GltfDocument, survey: Survey): Json {
+  const { json } = document;
+  const { meshes, materials, skins, accessors } = survey;
+  const list = (name: string): unknown[] => (Array.isArray(json[name]) ? (json[name] as unknown[]) : []);
+  const only = (name: string, used: ReadonlySet<number>, of: (item: Json, index: number) => Json): Json[] =>
+    list(name).map((item, index) => (used.has(index) && isObject(item) ? of(item, index) : {}));
+  const own = extensionsIn(json.extensions, ['KHR_lights_punctual']);
+  return {
+    asset: { version: '2.0' },
+    scene: 0,
+    scenes: [{ nodes: rootNodes(document) }],
+    nodes: list('nodes').map((node, index) => nodeOf(isObject(node) ? node : {}, index, survey)),
+    meshes: list('meshes').map((mesh, index) => {
+      if (!meshes.has(index)) return { primitives: [] };
+      return { primitives: survey.primitivesOf(index).map(primitiveOf), weights: (mesh as Json).weights };
+    }),
+    materials: only('materials', materials, ({ name: _, extras: __, ...material }) => material),
+    textures: list('textures').map((texture, index) =>
+      isObject(texture) && hasSource(texture) ? { sampler: texture.sampler, source: sourceOf(document, index) } : {},
+    ),
+    samplers: list('samplers'),
+    images: list('images').map(() => ({})),
+    accessors: only('accessors', accessors, ({ name: _, extras: __, ...accessor }) => accessor),
+    bufferViews: list('bufferViews').map((view) => ({ byteStride: isObject(view) ? view.byteStride : undefined })),
+    skins: only('skins', skins, ({ joints, inverseBindMatrices }) => ({ joints, inverseBindMatrices })),
+    animations: list('animations')
+      .map((animation) => animationOf(animation as Json, survey))
+      .filter(({ channels }) => (channels as Json[]).length > 0),
+    extensionsUsed: list('extensionsUsed').filter((name) => typeof name === 'string' && READ.test(name)),
+    ...(own && { extensions: own }),
+  };
+}
+
+const hasSource = ({ source, extensions }: Json): boolean =>
+  source !== undefined || (isObject(extensions) && isObject(extensions.EXT_texture_webp));
+
+/** Where it stands, and what of it is shown. Nodes beyond the scene may be named by skins: of these only the place is kept. */
+function nodeOf(node: Json, index: number, { nodes, lit }: Survey): Json {
+  const { matrix, translation, rotation, scale } = node;
+  const place = { matrix, translation, rotation, scale };
+  if (!nodes.has(index)) return place;
+  const { mesh, skin, children, weights, extensions } = node;
+  const names = ['EXT_mesh_gpu_instancing', ...(lit.has(index) ? ['KHR_lights_punctual'] : [])];
+  return { ...place, mesh, skin, children, weights, extensions: extensionsIn(extensions, names) };
+}
+
+function primitiveOf({ attributes, indices, material, mode, targets }: Json): Json {
+  return { attributes, indices, material, mode, targets };
+}
+
+function animationOf(animation: Json, survey: Survey): Json {
+  return { samplers: animation.samplers, channels: survey.channelsOf(animation) };
+}
+
+function extensionsIn(extensions: unknown, names: readonly string[]): Json | undefined {
+  if (!isObject(extensions)) return undefined;
+  const found = names.filter((name) => extensions[name] !== undefined);
+  return found.length > 0 ? Object.fromEntries(found.map((name) => [name, extensions[name]])) : undefined;
+}

@@ -1,0 +1,131 @@
+import { grouped } from '../../bytes.js';
+import { damaged } from '../../faults.js';
+import { isObject } from '../../json.js';
+import type { Json } from '../container.js';
+import type { GltfDocument } from '../document.js';
+import { layoutOf } from './costs.js';
+import type { Survey } from './survey.js';
+
+/** A buffer view that meshoptimizer has compressed: see EXT_meshopt_compression. */
+export interface MeshoptView {
+  readonly source: Uint8Array<ArrayBuffer>;
+  readonly count: number;
+  /** Bytes of an element. */
+  readonly stride: number;
+  readonly mode: string;
+  readonly filter: string | undefined;
+}
+
+const MODES = ['ATTRIBUTES', 'TRIANGLES', 'INDICES'];
+const FILTERS = ['NONE', 'OCTAHEDRAL', 'QUATERNION', 'EXPONENTIAL', 'COLOR'];
+
+/** The buffer views that accessors use, with every range checked. */
+export class Views {
+  /** Bytes of the accessors on the GPU. */
+  readonly byteLength: number;
+  readonly #document: GltfDocument;
+  readonly #used = new Set<number>();
+
+  /** Throws `decode/*`. */
+  constructor(document: GltfDocument, { accessors }: Survey) {
+    this.#document = document;
+    let bytes = 0;
+    for (const index of accessors) bytes += this.#check(index);
+    this.byteLength = bytes;
+  }
+
+  /** Copies them out of their buffers. Throws `decode/*`, `out-of-memory/budget`, and what the fetching of buffers does. */
+  async read(): Promise<(Uint8Array<ArrayBuffer> | MeshoptView | undefined)[]> {
+    const { bufferViews } = this.#document.json;
+    const views: (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[] = new Array(
+      Array.isArray(bufferViews) ? bufferViews.length : 0,
+    ).fill(undefined);
+    for (const index of this.#used) {
+      const packed = packingOf(this.#document.item('bufferViews', index));
+      views[index] = packed ? await this.#readPacked(packed, index) : await this.#copyOf(index);
+    }
+    return views;
+  }
+
+  async #copyOf(index: number): Promise<Uint8Array<ArrayBuffer>> {
+    const bytes = await this.#document.readView(index);
+    this.#document.take(bytes.length);
+    return bytes.slice() as Uint8Array<ArrayBuffer>;
+  }
+
+  async #readPacked(packed: Json, index: number): Promise<MeshoptView> {
+    const document = this.#document;
+    const { count, byteStride, mode, filter = 'NONE' } = packed;
+    const path = `bufferViews[${index}]`;
+    if (!MODES.includes(mode as string) || !FILTERS.includes(filter as string))
+      return document.fail(path, 'a mode and a filter of meshopt', { mode, filter });
+    const source = await document.readRange(packed, path);
+    document.take((count as number) * (byteStride as number) + source.length);
+    return {
+      source: source.slice() as Uint8Array<ArrayBuffer>,
+      count: count as number,
+      stride: byteStride as number,
+      mode: mode as string,
+      filter: filter as string,
+    };
+  }
+
+  /** Checks that an accessor lies within its views. @returns its bytes on the GPU, those between its elements included */
+  #check(index: number): number {
+    const document = this.#document;
+    const accessor = document.item('accessors', index);
+    const path = `accessors[${index}]`;
+    const { count, componentBytes, byteLength } = layoutOf(document, index);
+    const { sparse } = accessor;
+    if (isObject(sparse)) this.#checkSparse(sparse, count, byteLength, componentBytes, path);
+    else if (sparse !== undefined) document.fail(`${path}.sparse`, 'an object', sparse);
+    if (accessor.bufferView === undefined) return byteLength;
+    const width = count > 0 ? byteLength / count : 0;
+    const { byteStride = width } = document.item('bufferViews', accessor.bufferView);
+    const isStride = document.isIndex(byteStride) && byteStride >= width && byteStride <= 252;
+    if (count > 0 && (!isStride || byteStride % componentBytes > 0))
+      document.fail(`${path}, byteStride`, 'a stride that its elements fit in', byteStride);
+    const span = count === 0 ? 0 : (count - 1) * (byteStride as number) + width;
+    this.#checkRange(accessor, span, componentBytes, path);
+    return count * (byteStride as number);
+  }
+
+  #checkSparse(sparse: Json, count: number, byteLength: number, componentBytes: number, path: string): void {
+    const document = this.#document;
+    const { indices, values } = sparse;
+    const own = document.isIndex(sparse.count) && sparse.count <= count ? sparse.count : undefined;
+    const size = isObject(indices) ? { 5121: 1, 5123: 2, 5125: 4 }[String(indices.componentType)] : undefined;
+    if (own === undefined || size === undefined || !isObject(indices) || !isObject(values))
+      return document.fail(`${path}.sparse`, 'a count, indices and values', sparse);
+    this.#checkRange(indices, own * size, size, `${path}.sparse.indices`);
+    this.#checkRange(values, count === 0 ? 0 : (byteLength / count) * own, componentBytes, `${path}.sparse.values`);
+  }
+
+  #checkRange(place: Json, bytes: number, alignment: number, path: string): void {
+    const document = this.#document;
+    const { bufferView, byteOffset = 0 } = place;
+    const view = document.item('bufferViews', bufferView);
+    const packed = packingOf(view);
+    const length = packed ? this.#unpackedBytes(packed, bufferView as number) : view.byteLength;
+    if (!document.isIndex(byteOffset) || byteOffset % alignment > 0)
+      return document.fail(`${path}.byteOffset`, `a multiple of ${alignment}`, byteOffset);
+    if (!document.isIndex(length))
+      return document.fail(`bufferViews[${String(bufferView)}].byteLength`, 'a whole number', length);
+    if (byteOffset + bytes > length)
+      throw damaged(`${document.name}, ${path}`, `${grouped(byteOffset + bytes)} bytes`, grouped(length));
+    this.#used.add(bufferView as number);
+  }
+
+  #unpackedBytes({ count, byteStride }: Json, view: number): number {
+    const { isIndex } = this.#document;
+    const isFine = isIndex(count) && isIndex(byteStride) && byteStride >= 1 && byteStride <= 256;
+    if (isFine) return count * byteStride;
+    return this.#document.fail(`bufferViews[${view}]`, 'a count and a stride of meshopt', { count, byteStride });
+  }
+}
+
+function packingOf({ extensions }: Json): Json | undefined {
+  if (!isObject(extensions)) return undefined;
+  const packed = extensions.EXT_meshopt_compression ?? extensions.KHR_meshopt_compression;
+  return isObject(packed) ? packed : undefined;
+}
