@@ -1,16 +1,19 @@
-/** The most memory that a page's process has had, where the system tells: on Linux. */
+/** The most memory that the processes of a page have had, if the system tells: on Linux. */
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 
-/** Bytes at most of a renderer process of Chromium that this process, or a child of it, has started; NaN where the system does not tell. */
-export function peakBytes() {
+/**
+ * The most bytes that a process of Chromium has taken which this process, or a child of it, has started; NaN where the system does not tell.
+ * @param type `renderer` or `gpu-process`
+ */
+export function peakBytes(type = 'renderer') {
   if (!existsSync('/proc/self/status')) return NaN;
   const processes = readdirSync('/proc').filter((name) => /^\d+$/.test(name));
   const peaks = processes.map((pid) => {
     try {
       const isOurs = ancestors(pid).includes(String(process.pid));
-      const isRenderer = readFileSync(`/proc/${pid}/cmdline`, 'utf8').includes('--type=renderer');
+      const isOfType = readFileSync(`/proc/${pid}/cmdline`, 'utf8').includes(`--type=${type}`);
       const peak = /VmHWM:\s*(\d+)/.exec(readFileSync(`/proc/${pid}/status`, 'utf8'));
-      return isOurs && isRenderer && peak ? 1024 * Number(peak[1]) : 0;
+      return isOurs && isOfType && peak ? 1024 * Number(peak[1]) : 0;
     } catch {
       // It has ended meanwhile.
       return 0;

@@ -2,14 +2,17 @@
 import { spawnSync } from 'node:child_process';
 import {
   copyFileSync,
+  cpSync,
   existsSync,
   mkdirSync,
   mkdtempSync,
   readdirSync,
   readFileSync,
   rmSync,
+  statSync,
   writeFileSync,
 } from 'node:fs';
+import { createServer } from 'node:http';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -20,19 +23,23 @@ import { root } from '../lib/run.mjs';
 import { serve } from '../../packages/cli/src/lib/server.mjs';
 import { peakBytes } from './peak.mjs';
 
-const USAGE = `usage: npm run lab:attack -- [FOLDER (default ../shared/cases/attack)] [--only PATTERN] [--seconds N (default 40)]
+const USAGE = `usage: npm run lab:attack -- [FOLDER (default ../shared/cases/attack)] [--only PATTERN] [--renderer webgl] [--seconds N (default 40)]
 
-Reads every file of a folder in Node, and shows each in Chromium with an honest scene of 400 splats (honest.ply of the folder) half a second later; both with a heap of
-300 MB. Prints what came of it, the time and the most memory of a process (on Linux, which tells). Ends with an error where one crashes, ends without a named error, takes
-more than 400 MB of the page's process, or keeps the honest scene waiting for more than a second.`;
+Reads every scene file of a folder in Node, and shows each in Chromium, files named mesh-* and csp-* as meshes, with an honest scene of 400 splats (honest.ply of the folder, or of
+../attack) half a second later, and again when it is removed; both with a heap of 300 MB. A folder within the folder is a streamed scene. Prints the result, the time, the most memory of
+the page's process and of the GPU's (on Linux) above an empty page, and the requests to another origin. Ends with an error if one crashes, ends without a named error, takes more than
+400 MB of a process, asks another origin, or delays the honest scene by more than a second.`;
 const HEAP = '--max-old-space-size=300';
-const MOST_PEAK = 400e6;
-const MOST_WAIT_MS = 1_000;
+const MAX_PEAK = 400e6;
+const MAX_WAIT_MS = 1_000;
+/** The port of the other origin that the cases name. */
+const FOREIGN_PORT = 18_602;
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
   options: {
     only: { type: 'string', default: '' },
+    renderer: { type: 'string', default: '' },
     seconds: { type: 'string', default: '40' },
     help: { type: 'boolean' },
   },
@@ -42,7 +49,8 @@ if (values.help) {
   process.exit(0);
 }
 const folder = resolve(positionals[0] ?? join(root, '../shared/cases/attack'));
-if (!existsSync(join(folder, 'honest.ply'))) {
+const honestFolder = [folder, join(folder, '../attack')].find((each) => existsSync(join(each, 'honest.ply')));
+if (honestFolder === undefined) {
   console.error(`${folder}: expected a folder with honest.ply and hostile files\n\n${USAGE}`);
   process.exit(1);
 }
@@ -53,6 +61,11 @@ const faults = [];
 
 /** Where a file lies for the page: streamed scenes are known by the name of their manifest. */
 function placed(file) {
+  if (statSync(join(folder, file)).isDirectory()) {
+    cpSync(join(folder, file), join(served, file), { recursive: true });
+    if (file === 'lod-many') writeManyParts(join(served, file));
+    return `/files/${encodeURIComponent(file)}/lod-meta.json`;
+  }
   mkdirSync(join(served, file));
   const name =
     /detail/.test(file) && /\.json/.test(file) ? 'detail.json' : /^lod-.*\.json$/.test(file) ? 'lod-meta.json' : file;
@@ -61,9 +74,23 @@ function placed(file) {
   return `/files/${encodeURIComponent(file)}/${name}`;
 }
 
+/** An index of 300 copies of part.sog, one splat of each. */
+function writeManyParts(to) {
+  const filenames = Array.from({ length: 300 }, (_, k) => `${k}.sog`);
+  for (const name of filenames) copyFileSync(join(to, 'part.sog'), join(to, name));
+  const bound = { min: [0, 0, 0], max: [1, 1, 1] };
+  const children = filenames.map((_, file) => ({ bound, lods: { 0: { file, offset: 0, count: 1 } } }));
+  writeFileSync(
+    join(to, 'lod-meta.json'),
+    JSON.stringify({ version: 1, lodLevels: 1, filenames, tree: { bound, children } }),
+  );
+}
+
+const isMesh = (file) => /^(mesh|csp)-/.test(file);
+
 function inNode(file) {
-  // Manifests and models are opened by the element alone.
-  if (/detail|\.onnx$/.test(file)) return undefined;
+  // Manifests, models, views and meshes are opened by the element alone.
+  if (/detail|views|\.onnx$/.test(file) || isMesh(file) || statSync(join(folder, file)).isDirectory()) return undefined;
   const script = join(root, 'tests/formats/support/read-measured.ts');
   const { stdout, stderr } = spawnSync(process.execPath, [HEAP, '--import', 'tsx', script, join(folder, file), ''], {
     encoding: 'utf8',
@@ -81,11 +108,15 @@ async function inChromium(file, port) {
   try {
     const page = await browser.newPage();
     const crash = new Promise((done) => page.on('crash', () => done({ result: 'unnamed: the page crashed' })));
-    await page.goto(`http://localhost:${port}/attack/index.html`);
+    await page.goto(`http://localhost:${port}/attack/index.html${values.renderer && `?renderer=${values.renderer}`}`);
     await page.waitForFunction('window.isReady');
-    const run = page.evaluate(([...args]) => window.attack(...args), [placed(file), '/honest/honest.ply', limitMs]);
+    const empty = [peakBytes(), peakBytes('gpu-process')];
+    const run = page.evaluate(
+      ([...args]) => window.attack(...args),
+      [placed(file), '/honest/honest.ply', limitMs, isMesh(file)],
+    );
     const found = await Promise.race([run, crash]);
-    return { ...found, peak: peakBytes() };
+    return { ...found, peak: peakBytes() - empty[0], gpuPeak: peakBytes('gpu-process') - empty[1] };
   } finally {
     await browser.close();
   }
@@ -94,27 +125,43 @@ async function inChromium(file, port) {
 const server = await serve({
   '/attack/': `${root}scripts/attack`,
   '/cdn/': `${root}packages/element/cdn`,
-  '/honest/': folder,
+  '/honest/': honestFolder,
   '/files/': served,
 });
 const { port } = server.address();
+let foreignRequests = 0;
+const foreign = createServer((_, response) => {
+  foreignRequests++;
+  response.writeHead(200, { 'Access-Control-Allow-Origin': '*' }).end('a');
+}).listen(FOREIGN_PORT);
 const megabytes = (bytes) => (bytes === undefined || Number.isNaN(bytes) ? '?' : `${Math.round(bytes / 1e6)} MB`);
 console.log(
-  'file | Node: result, CPU, memory | Chromium: result, time, memory of the page, longest standstill | honest scene beside it (alone)',
+  'file | Node: result, CPU, memory | Chromium: result, time, memory of page and GPU process, longest standstill | honest scene beside it, later (alone) | foreign requests',
 );
 for (const file of files) {
   const node = inNode(file);
-  const { result, ms, peak, standstill, beside, alone, besideResult } = await inChromium(file, port);
+  foreignRequests = 0;
+  const found = await inChromium(file, port);
+  const { result, ms, peak, gpuPeak, standstill, beside, alone, besideResult, later, laterResult } = found;
   const first = node ? `${node.result}, ${Math.round(node.cpuMs)} ms, ${megabytes(node.peak)}` : 'not read there';
   console.log(
-    `${file} | ${first} | ${result}, ${ms} ms, ${megabytes(peak)}, ${standstill} ms | ${beside} ms (${alone} ms)`,
+    `${file} | ${first} | ${result}, ${ms} ms, ${megabytes(peak)} + ${megabytes(gpuPeak)}, ${standstill} ms | ` +
+      `${beside} ms, ${later} ms (${alone} ms) | ${foreignRequests}`,
   );
-  if (/unnamed|undefined/.test(`${node?.result} ${result}`.replace(/^undefined /, '')))
-    faults.push(`${file}: no named error`);
-  if (peak > MOST_PEAK) faults.push(`${file}: ${megabytes(peak)} of the page's process`);
-  if (besideResult !== 'shown' || beside > alone + MOST_WAIT_MS)
-    faults.push(`${file}: the honest scene came after ${beside} ms, alone ${alone}`);
+  const isNamed = !/unnamed|undefined|nothing for/.test(`${node?.result} ${result}`.replace(/^undefined /, ''));
+  if (!isNamed) faults.push(`${file}: no named error (${result})`);
+  for (const [what, bytes] of Object.entries({ page: peak, GPU: gpuPeak }))
+    if (bytes > MAX_PEAK) faults.push(`${file}: ${megabytes(bytes)} of the process of the ${what}`);
+  for (const [when, took, came] of [
+    ['beside it', beside, besideResult],
+    ['later', later, laterResult],
+  ])
+    if (came !== 'shown' || took > alone + MAX_WAIT_MS)
+      faults.push(`${file}: the honest scene ${when} came after ${took} ms, alone ${alone}`);
+  if (foreignRequests > 0) faults.push(`${file}: ${foreignRequests} requests to another origin`);
 }
+foreign.closeAllConnections();
+foreign.close();
 server.closeAllConnections();
 server.close();
 rmSync(served, { recursive: true });

@@ -12,11 +12,13 @@ import {
   viewerFrame,
   type Pose,
 } from '../../packages/element/src/camera/orbit.js';
+import { ATTRIBUTES } from '../../packages/element/src/attributes.js';
+import { fieldOfViewGrammar, orbitGrammar, targetGrammar } from '../../packages/element/src/camera/grammar.js';
 import { poseOf } from '../../packages/element/src/camera/settings.js';
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
 import { poseOfView, type CameraView, type ViewContext } from '../../packages/element/src/views/camera-view.js';
 import { Flight } from '../../packages/element/src/views/flight.js';
-import { easingOf, poseAlong, unwound } from '../../packages/element/src/views/path.js';
+import { easingOf, pathThrough, unwound } from '../../packages/element/src/views/path.js';
 import { readViews } from '../../packages/element/src/views/read-views.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
@@ -183,18 +185,18 @@ test('a path passes through its views at their times, is smooth there, and turns
   const poses = [pose(0, 1), pose(6, 4, 1), pose(1, 2, 3), pose(1, 2, 3)];
   const times = [0, 1, 4, 5];
   times.forEach((time, i) => {
-    const there = poseAlong(poses, times, time);
+    const there = pathThrough(poses, times)(time);
     near([Math.cos(there.theta), Math.sin(there.theta), there.radius, there.x], [Math.cos(poses[i].theta), Math.sin(poses[i].theta), poses[i].radius, poses[i].x], `${time} s`, 1e-12); // prettier-ignore
   });
   const step = 1e-4;
   for (let time = step; time < 5 - step; time += 0.01) {
-    const [a, b, c] = [time - step, time, time + step].map((at) => poseAlong(poses, times, at));
+    const [a, b, c] = [time - step, time, time + step].map((at) => pathThrough(poses, times)(at));
     assert.ok(Math.abs(b.theta - a.theta) < 10 * step, `${time}: no leap`);
     assert.ok(Math.abs(a.x - 2 * b.x + c.x) < 1e-4 * 0.1, `${time}: no corner`);
     assert.ok(b.radius > 0);
   }
-  near([poseAlong([pose(0, 1), pose(0, 4)], [0, 1], 0.5).radius], [2], 'distances go by factors');
-  assert.deepEqual([poseAlong(poses, times, -3), poseAlong([poses[0]], [7], 9)], [poses[0], poses[0]]);
+  near([pathThrough([pose(0, 1), pose(0, 4)], [0, 1])(0.5).radius], [2], 'distances go by factors');
+  assert.deepEqual([pathThrough(poses, times)(-3), pathThrough([poses[0]], [7])(9)], [poses[0], poses[0]]);
   near([unwound(pose(6, 1), pose(0, 1)).theta], [6 - 2 * Math.PI], 'turns');
 });
 
@@ -272,4 +274,23 @@ test('eyes and targets in viewer space', () => {
   near([pose.theta, pose.phi, pose.radius, pose.x, pose.y, pose.z], [0, Math.PI / 2, 5, 1, 2, 1], 'pose');
   near(toViewer(given.frame, [0, 1, 0]), [0, -1, 0], 'y up');
   assert.ok(dot(forwardOf(pose), [0, 0, -1]) > 0.999);
+});
+
+test('a path of many keyframes costs each frame next to nothing, however wound it is', () => {
+  const count = 40_000;
+  const poses = Array.from({ length: count }, (_, k) => pose(3 * k, 1 + (k % 7)));
+  const times = poses.map((_, k) => k / 30);
+  const before = process.cpuUsage();
+  const along = pathThrough(poses, times);
+  for (let frame = 0; frame < 1_000; frame++) along((frame * count) / 30_000);
+  const { user } = process.cpuUsage(before);
+  assert.ok(user < 1e6, `${user / 1e3} ms for the path and a thousand frames`);
+});
+
+test('views that somebody else has written: long numbers are read in linear time', () => {
+  const before = process.cpuUsage();
+  for (const grammar of [orbitGrammar('auto'), targetGrammar, fieldOfViewGrammar, ATTRIBUTES.detail.grammar])
+    assert.equal(grammar.parse(`${'9'.repeat(200_000)}!`), null);
+  const { user } = process.cpuUsage(before);
+  assert.ok(user < 0.5e6, `${user / 1e3} ms`);
 });

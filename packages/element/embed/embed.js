@@ -1,10 +1,22 @@
 /** The page of embed.html: its address says what is shown. */
-import { GaussianSplatElement } from './gaussian-splat.min.js';
+import './gaussian-splat.min.js';
 
 /** Attributes that are addresses. */
-const ADDRESSES = ['src', 'poster'];
-/** Attributes that name further models, or send cookies to other servers: a link that somebody else has written sets none of these. */
-const REFUSED = ['contract', 'chain', 'postprocess', 'crossorigin'];
+const ADDRESSES = ['src', 'poster', 'views'];
+/**
+ * Attributes that a link may set. Absent are those that name further models, send cookies to other servers, or put words into the page: whoever wrote the link is a
+ * stranger to this page.
+ */
+const ALLOWED = [
+  ...ADDRESSES,
+  ...['alt', 'loading', 'reveal', 'camera-controls', 'camera-orbit', 'camera-target', 'field-of-view'],
+  ...['min-camera-orbit', 'max-camera-orbit', 'min-camera-target', 'max-camera-target'],
+  ...['min-field-of-view', 'max-field-of-view', 'interpolation-decay', 'touch-action', 'zoom'],
+  ...['disable-zoom', 'disable-pan', 'disable-tap', 'navigation', 'auto-rotate', 'auto-rotate-delay'],
+  ...['rotation-per-second', 'interaction-prompt', 'interaction-prompt-style', 'interaction-prompt-threshold'],
+  ...['up', 'max-pixel-ratio', 'frame-budget', 'quality', 'renderer', 'max-sh-degree', 'filter', 'order', 'detail'],
+  ...['controls-panel', 'time', 'pose', 'crop', 'autoplay', 'loop'],
+];
 
 /** What a `<splat-scene>` has in the element's place. */
 const OF_SCENE = ['src', 'up', 'crop', 'pose'];
@@ -26,18 +38,26 @@ function allowed(name) {
   );
 }
 
+/** Redirects lead to other servers, too: the policy of the page lets none of them be asked. */
+function restrict() {
+  const policy = document.createElement('meta');
+  policy.httpEquiv = 'Content-Security-Policy';
+  const sources = ["'self'", ...origins].join(' ');
+  policy.content = `connect-src ${sources}; img-src ${sources} blob: data:`;
+  document.head.append(policy);
+}
+
 function show() {
+  restrict();
   if (!query.has('src')) throw new Error('src: expected the address of a scene, as in embed.html?src=garden.spz');
   const scene = document.createElement('gaussian-splat');
   scene.setAttribute('camera-controls', '');
   // A box belongs to a scene, which then has a tag of its own.
   const holder = query.has('crop') ? scene.appendChild(document.createElement('splat-scene')) : scene;
   for (const [name, value] of query) {
-    const isOfScene = OF_SCENE.includes(name);
-    const isKnown = isOfScene || GaussianSplatElement.observedAttributes.includes(name);
-    if (!isKnown || REFUSED.includes(name)) continue;
+    if (!ALLOWED.includes(name)) continue;
     if (name === 'camera-controls' && value === 'false') scene.removeAttribute(name);
-    else (isOfScene ? holder : scene).setAttribute(name, ADDRESSES.includes(name) ? allowed(name) : value);
+    else (OF_SCENE.includes(name) ? holder : scene).setAttribute(name, ADDRESSES.includes(name) ? allowed(name) : value);
   }
   document.title = query.get('alt') || document.title;
   document.querySelector('main').append(scene);

@@ -102,7 +102,7 @@ const detailGrammar: AttributeGrammar<DetailChoice> = {
   parse: (written) => {
     const word = written.trim().toLowerCase();
     if (word === 'auto' || word === 'off') return word;
-    const pixels = /^(\d+\.?\d*|\.\d+)px$/.test(word) ? parseFloat(word) : NaN;
+    const pixels = /^(\d+(\.\d*)?|\.\d+)px$/.test(word) ? parseFloat(word) : NaN;
     return pixels <= MOST_DETAIL_PIXELS ? pixels : null;
   },
 };

@@ -8,9 +8,9 @@ export { readCoarsest } from './lod/read-coarsest.js';
 export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { readPrefix } from './read-prefix.js';
 export { MOST_DROPPED, readScene, type ReadSceneOptions } from './read-scene.js';
-export { readTriangles, type TriangleFile, type TriangleSource } from './gltf/triangles/read-triangles.js';
-export type { ImageFile } from './gltf/triangles/images.js';
-export type { MeshoptView } from './gltf/triangles/views.js';
+export { readTriangles, type TriangleFile, type TriangleSource } from './triangles/read-triangles.js';
+export type { ImageFile } from './triangles/images.js';
+export type { MeshoptView } from './triangles/views.js';
 export { isSequence, MAX_HEADER_BYTES as HEADER_BYTES } from './signatures.js';
 export type { FileBytes } from './bytes.js';
 export {

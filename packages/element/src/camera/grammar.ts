@@ -30,7 +30,7 @@ export interface AttributeGrammar<T> {
   parse(text: string): T | null;
 }
 
-const NUMBER_WITH_UNIT = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)([a-z%]*)$/i;
+const NUMBER_WITH_UNIT = /^([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)([a-z%]*)$/i;
 const METRES_PER_UNIT: Readonly<Record<string, number>> = { '': 1, m: 1, cm: 1e-2, mm: 1e-3 };
 const RADIANS_PER_UNIT: Readonly<Record<string, number>> = { deg: Math.PI / 180, rad: 1 };
 
@@ -211,7 +211,7 @@ export function readAttribute<T>(
   const value = grammar.parse(String(text));
   if (value !== null) return value;
   warn(
-    `<gaussian-splat> ${name}: expected ${grammar.expected}, found "${text}"; the default "${grammar.fallback}" is used.`,
+    `<gaussian-splat> ${name}: expected ${grammar.expected}, found "${String(text).slice(0, 200)}"; the default "${grammar.fallback}" is used.`,
   );
   return fallback();
 }

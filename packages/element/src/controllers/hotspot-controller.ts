@@ -144,7 +144,7 @@ export class HotspotController implements ReactiveController {
     const read = (name: string, text: string | undefined): Point | null => {
       const point = text === undefined ? null : parsePoint(text);
       if (text !== undefined && point === null)
-        this.#of.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in metres, found "${text}".`);
+        this.#of.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in metres, found "${text.slice(0, 200)}".`);
       return point;
     };
     const position = read('data-position', dataset.position);
@@ -156,25 +156,26 @@ export class HotspotController implements ReactiveController {
   /** Moves the boxes to where the last frame has their points, and hides those that are in no frame. */
   #place(): void {
     const boxes = this.#of.hotspotLayer?.children;
+    // Read once, before anything is written: each reading after a change of style would be another layout.
+    const { clientWidth: width, clientHeight: height } = this.#host;
     [...this.#hotspots.values()].forEach((hotspot, i) => {
       const box = boxes?.[i] as HTMLElement | undefined;
       if (box === undefined) return;
-      this.#locate(hotspot);
+      this.#locate(hotspot, width, height);
       const isPlaced = hotspot.depth > 0;
       box.classList.toggle('placed', isPlaced);
       if (isPlaced) box.style.transform = `translate(${hotspot.x}px, ${hotspot.y}px) translate(-50%, -50%)`;
-      this.#show(hotspot, box);
+      this.#show(hotspot, box, width, height);
     });
   }
 
-  #locate(hotspot: Hotspot): void {
+  #locate(hotspot: Hotspot, width: number, height: number): void {
     const camera = this.#camera;
     hotspot.depth = 0;
     if (camera === undefined || hotspot.position === null) return;
-    const { clientWidth, clientHeight } = this.#host;
     const { x, y, depth } = project(camera, toScene(this.#of.camera.viewerFrame, hotspot.position));
-    hotspot.x = (x * clientWidth) / camera.width;
-    hotspot.y = (y * clientHeight) / camera.height;
+    hotspot.x = (x * width) / camera.width;
+    hotspot.y = (y * height) / camera.height;
     hotspot.depth = depth > camera.near ? depth : 0;
     hotspot.facesCamera = this.#facesCamera(hotspot, camera);
   }
@@ -189,14 +190,14 @@ export class HotspotController implements ReactiveController {
     return [0, 1, 2].reduce((sum, r) => sum + row(r, n, 0) * row(r, p, 1), 0) < 0;
   }
 
-  #show(hotspot: Hotspot, box: HTMLElement): void {
+  #show(hotspot: Hotspot, box: HTMLElement, width: number, height: number): void {
     const { x, y } = hotspot;
     const isOpen = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
     // Of a label whose point has left the frame a part may still be there to read.
     box.classList.toggle('hidden', !isOpen);
     const holdsPanel = !isOpen && hotspot.elements.some((element) => element.querySelector(labelParts.panel) !== null);
     box.classList.toggle('with-panel', holdsPanel);
-    const isVisible = isOpen && x >= 0 && y >= 0 && x <= this.#host.clientWidth && y <= this.#host.clientHeight;
+    const isVisible = isOpen && x >= 0 && y >= 0 && x <= width && y <= height;
     hotspot.isVisible = isVisible;
     for (const element of hotspot.elements) {
       if (this.#told.get(element) === isVisible) continue;
@@ -244,6 +245,10 @@ export class HotspotController implements ReactiveController {
 
 function groupBySlot(children: readonly HTMLElement[]): Map<string, HTMLElement[]> {
   const groups = new Map<string, HTMLElement[]>();
-  for (const child of children) groups.set(child.slot, [...(groups.get(child.slot) ?? []), child]);
+  for (const child of children) {
+    const group = groups.get(child.slot);
+    if (group) group.push(child);
+    else groups.set(child.slot, [child]);
+  }
   return groups;
 }

@@ -25,32 +25,48 @@ export function unwound(pose: Pose, before: Pose): Pose {
 /** Distances go by factors: half of the way from 1 m to 4 m is 2 m. */
 const rise = (pose: Pose, key: (typeof KEYS)[number]): number => (key === 'radius' ? Math.log(pose.radius) : pose[key]);
 
+/** A way from a time to a pose. */
+export type Path = (time: number) => Pose;
+
 /**
  * A smooth path through poses: Catmull and Rom's cubic through values and times.
  * @param times one for each pose, rising.
- * @param time clamped to those.
- * @returns exactly a pose at its own time
+ * @returns a function of a time, which is clamped to those; at the time of a pose it returns exactly that pose
  */
-export function poseAlong(poses: readonly Pose[], times: readonly number[], time: number): Pose {
+export function pathThrough(poses: readonly Pose[], times: readonly number[]): Path {
   const last = poses.length - 1;
-  const chain = poses.reduce<Pose[]>((done, pose, i) => [...done, i === 0 ? pose : unwound(pose, done[i - 1])], []);
-  if (last === 0 || time <= times[0]) return chain[0];
-  if (!(time < times[last])) return chain[last];
-  const i = times.findIndex((next, k) => k < last && time < times[k + 1] && time >= next);
-  const step = times[i + 1] - times[i];
-  const t = (time - times[i]) / step;
-  if (t === 0) return chain[i];
+  const chain: Pose[] = [];
+  for (const pose of poses) chain.push(chain.length === 0 ? pose : unwound(pose, chain[chain.length - 1]));
   const slope = (k: number, key: (typeof KEYS)[number]): number => {
-    // At its ends the path sets out and arrives straight.
+    // At its ends the path is straight.
     const [a, b] = [Math.max(0, k - 1), Math.min(last, k + 1)];
-    return (rise(chain[b], key) - rise(chain[a], key)) / (times[b] - times[a]);
+    return (rise(chain[b], key) - rise(chain[a], key)) / (times[b] - times[a] || 1);
   };
-  const at = (key: (typeof KEYS)[number]): number => {
-    const [from, to] = [rise(chain[i], key), rise(chain[i + 1], key)];
-    const [out, into] = [slope(i, key) * step, slope(i + 1, key) * step];
-    const value =
-      from + t * out + t * t * (3 * (to - from) - 2 * out - into) + t * t * t * (2 * (from - to) + out + into);
-    return key === 'radius' ? Math.exp(value) : value;
+  return (time) => {
+    if (last === 0 || time <= times[0]) return chain[0];
+    if (!(time < times[last])) return chain[last];
+    const i = indexBefore(times, time);
+    const step = times[i + 1] - times[i];
+    const t = (time - times[i]) / step;
+    if (t === 0) return chain[i];
+    const at = (key: (typeof KEYS)[number]): number => {
+      const [from, to] = [rise(chain[i], key), rise(chain[i + 1], key)];
+      const [out, into] = [slope(i, key) * step, slope(i + 1, key) * step];
+      const value =
+        from + t * out + t * t * (3 * (to - from) - 2 * out - into) + t * t * t * (2 * (from - to) + out + into);
+      return key === 'radius' ? Math.exp(value) : value;
+    };
+    return Object.fromEntries(KEYS.map((key) => [key, at(key)])) as unknown as Pose;
   };
-  return Object.fromEntries(KEYS.map((key) => [key, at(key)])) as unknown as Pose;
+}
+
+/** A number `i` with `times[i] <= time < times[i + 1]`, of a time between the first and the last, by bisection. */
+function indexBefore(times: readonly number[], time: number): number {
+  let [low, high] = [0, times.length - 1];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= time) low = middle;
+    else high = middle;
+  }
+  return low;
 }

@@ -7,7 +7,7 @@ import type { GaussianSplatEventMap } from '../events.js';
 import { languageOf, type SpokenStrings, type ViewWord } from '../words.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';
 import { Flight } from './flight.js';
-import { easingOf, poseAlong, unwound, type Easing } from './path.js';
+import { easingOf, pathThrough, unwound, type Easing, type Path } from './path.js';
 import { readViews, type NamedView, type ViewList } from './read-views.js';
 
 /** How a flight goes. */
@@ -175,10 +175,27 @@ export class Tour implements ReactiveController, Mover {
     const { views, path } = await this.#ready();
     const stops = path.length > 0 ? path : views.map(({ view }, i) => ({ time: (i * PART_MS) / 1_000, view }));
     if (stops.length === 0) return null;
-    const poses = stops.map(({ view }) => poseOfView(view, this.#of.camera.context));
     const times = stops.map(({ time }) => time);
     const [first, seconds] = [times[0], times[times.length - 1] - times[0]];
-    return { at: (share) => poseAlong(poses, times, first + share * seconds), seconds };
+    const along = this.#along(path.length > 0 ? path : views, stops, times);
+    return { at: (share) => along(first + share * seconds), seconds };
+  }
+
+  /** The path that was computed last: a page that scrolls asks for it in every frame. */
+  #known: { readonly list: unknown; readonly context: string; readonly path: Path } | undefined;
+
+  #along(list: unknown, stops: ViewList['path'], times: readonly number[]): Path {
+    const { context } = this.#of.camera;
+    // Where the camera is now is no part of it: the path would be another one after each step.
+    const key = JSON.stringify({ ...context, from: undefined });
+    const known = this.#known;
+    if (known && known.list === list && known.context === key) return known.path;
+    const path = pathThrough(
+      stops.map(({ view }) => poseOfView(view, context)),
+      times,
+    );
+    this.#known = { list, context: key, path };
+    return path;
   }
 
   #fly(
@@ -190,8 +207,8 @@ export class Tour implements ReactiveController, Mover {
     const from = camera.goal;
     const to = unwound(poseOfView(view, camera.context), from);
     const ease = easingOf(easing);
-    const path = (elapsed: number): Pose =>
-      elapsed >= duration ? to : poseAlong([from, to], [0, 1], ease(elapsed / duration));
+    const along = pathThrough([from, to], [0, 1]);
+    const path = (elapsed: number): Pose => (elapsed >= duration ? to : along(ease(elapsed / duration)));
     this.#choose(index);
     const isSeen = this.#of.isOnShow && !prefersReducedMotion();
     return this.#start(path, isSeen ? Math.max(0, duration) : 0, index);

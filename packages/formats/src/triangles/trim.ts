@@ -1,7 +1,7 @@
-import { isObject } from '../../json.js';
-import type { Json } from '../container.js';
-import type { GltfDocument } from '../document.js';
-import { rootNodes } from '../nodes.js';
+import { isObject } from '../json.js';
+import type { Json } from '../gltf/container.js';
+import type { GltfDocument } from '../gltf/document.js';
+import { rootNodes } from '../gltf/nodes.js';
 import { sourceOf } from './images.js';
 import type { Survey } from './survey.js';
 
@@ -26,13 +26,13 @@ export function trimmed(document: GltfDocument, survey: Survey): Json {
       if (!meshes.has(index)) return { primitives: [] };
       return { primitives: survey.primitivesOf(index).map(primitiveOf), weights: (mesh as Json).weights };
     }),
-    materials: only('materials', materials, ({ name: _, extras: __, ...material }) => material),
+    materials: only('materials', materials, unnamed),
     textures: list('textures').map((texture, index) =>
       isObject(texture) && hasSource(texture) ? { sampler: texture.sampler, source: sourceOf(document, index) } : {},
     ),
     samplers: list('samplers'),
     images: list('images').map(() => ({})),
-    accessors: only('accessors', accessors, ({ name: _, extras: __, ...accessor }) => accessor),
+    accessors: only('accessors', accessors, unnamed),
     bufferViews: list('bufferViews').map((view) => ({ byteStride: isObject(view) ? view.byteStride : undefined })),
     skins: only('skins', skins, ({ joints, inverseBindMatrices }) => ({ joints, inverseBindMatrices })),
     animations: list('animations')
@@ -42,6 +42,8 @@ export function trimmed(document: GltfDocument, survey: Survey): Json {
     ...(own && { extensions: own }),
   };
 }
+
+const unnamed = (item: Json): Json => ({ ...item, name: undefined, extras: undefined });
 
 const hasSource = ({ source, extensions }: Json): boolean =>
   source !== undefined || (isObject(extensions) && isObject(extensions.EXT_texture_webp));

@@ -1,5 +1,5 @@
-import type { Json } from '../container.js';
-import type { GltfDocument } from '../document.js';
+import type { Json } from '../gltf/container.js';
+import type { GltfDocument } from '../gltf/document.js';
 
 /** Charged for each draw of a primitive and for each material: shader nodes, bindings and uniforms of three.js. */
 export const DRAW_BYTES = 2 ** 17;

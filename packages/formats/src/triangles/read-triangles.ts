@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { LoadBudget } from '../../budget.js';
-import { openContainer, type Json } from '../container.js';
-import { GltfDocument, type OpenUri } from '../document.js';
+import type { LoadBudget } from '../budget.js';
+import { openContainer, type Json } from '../gltf/container.js';
+import { GltfDocument, type OpenUri } from '../gltf/document.js';
 import { Images, type ImageFile } from './images.js';
 import { Survey } from './survey.js';
 import { trimmed } from './trim.js';

@@ -1,8 +1,8 @@
-import type { Json } from '../container.js';
-import type { GltfDocument } from '../document.js';
-import { walkNodes } from '../nodes.js';
-import { isSplats } from '../primitive.js';
-import { isObject } from '../../json.js';
+import type { Json } from '../gltf/container.js';
+import type { GltfDocument } from '../gltf/document.js';
+import { walkNodes } from '../gltf/nodes.js';
+import { isSplats } from '../gltf/primitive.js';
+import { isObject } from '../json.js';
 import {
   CHANNEL_BYTES,
   DRAW_BYTES,

@@ -1,4 +1,4 @@
-import { asciiOf, startsWith, viewOf } from '../../bytes.js';
+import { asciiOf, startsWith, viewOf } from '../bytes.js';
 
 /** The header of an image file: its media type and its size in pixels. */
 export interface ImageHeader {

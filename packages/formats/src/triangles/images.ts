@@ -1,8 +1,8 @@
-import { grouped } from '../../bytes.js';
-import { damaged } from '../../faults.js';
-import { isObject } from '../../json.js';
-import type { Json } from '../container.js';
-import type { GltfDocument } from '../document.js';
+import { grouped } from '../bytes.js';
+import { damaged } from '../faults.js';
+import { isObject } from '../json.js';
+import type { Json } from '../gltf/container.js';
+import type { GltfDocument } from '../gltf/document.js';
 import { TEXEL_BYTES } from './costs.js';
 import { imageHeader, type ImageHeader } from './image-size.js';
 import type { Survey } from './survey.js';
