@@ -4,8 +4,9 @@ import { createServer, type IncomingMessage, type ServerResponse } from 'node:ht
 import type { AddressInfo } from 'node:net';
 import { after, before, beforeEach, mock, test } from 'node:test';
 import { gzipSync } from 'node:zlib';
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, openUrl } from '@gaussian-splat/core';
 import { fetchScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import { fetchBytes } from '../../packages/generator/src/runtime/fetch-bytes.js';
 
 const CONTENT = Uint8Array.from({ length: 300_000 }, (_, i) => (i * i) >> 7);
 const OTHER = CONTENT.map((byte) => byte ^ 1);
@@ -239,3 +240,23 @@ test('memory that cannot be had is no broken connection', async () => {
   await assert.rejects(fetchScene(`${base}0`, { onArrival }), /out-of-memory\/allocation/);
   assert.equal(requests, 1);
 });
+
+/** All downloads of the product besides those of scenes. */
+const OTHERS: Readonly<Record<string, (url: string) => Promise<unknown>>> = {
+  'headers of models': (url) => openUrl(url),
+  'models, weights and the WebAssembly of the runtime': (url) => fetchBytes(url, { onProgress: () => undefined }),
+  'contracts beside models': (url) => fetchBytes(url),
+};
+
+for (const [what, open] of Object.entries(OTHERS))
+  test(`servers that never answer, stop or drip end ${what}, too`, { timeout: 120_000 }, async () => {
+    for (const name of ['headers, then silence', 'a part, then silence', 'a byte at a time', 'no answer']) {
+      const k = names.indexOf(name);
+      assert.ok(k >= 0, name);
+      const found = await open(`${base}${k}`).then(
+        () => 'right',
+        (error: unknown) => (error instanceof GaussianSplatError ? error.code : `unnamed: ${String(error)}`),
+      );
+      assert.match(found, /^network\/(interrupted|unreachable)$/, name);
+    }
+  });

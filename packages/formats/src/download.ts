@@ -1,3 +1,4 @@
+import { chunksOf, fetchPatiently, SilenceError } from '@gaussian-splat/core';
 import { refuse } from './budget.js';
 import { grouped, GrowingBytes } from './bytes.js';
 import { badStatus, forbidden, interrupted, label, unreachable } from './network-errors.js';
@@ -96,18 +97,11 @@ export class Download {
   async read(): Promise<void> {
     const { signal, onProgress, onArrival } = this.#options;
     const body = this.#body;
-    const reader = this.#response?.body?.getReader();
     const broken = (cause: unknown): Error => interrupted(this.#address, body.length, this.#total, cause);
-    const patience = new Patience();
-    while (reader) {
-      const { done, value } = await patience.read(reader).catch((cause: unknown) => {
-        signal?.throwIfAborted();
-        throw broken(cause);
-      });
-      if (done) break;
+    const failed = (cause: unknown): unknown => (signal?.aborted ? signal.reason : broken(cause));
+    for await (const value of this.#response ? chunksOf(this.#response, failed) : []) {
       const rest = this.#rest(value);
       if (rest === undefined) {
-        void reader.cancel().catch(() => {});
         // Nothing of it is right: all is asked for again.
         this.#tag = undefined;
         throw broken(new Error('another file than before'));
@@ -134,18 +128,13 @@ export class Download {
 
   async #request(headers: Record<string, string>): Promise<Response> {
     const { mode = 'cors', credentials = 'same-origin', signal } = this.#options;
-    const patience = new AbortController();
-    const timer = setTimeout(() => patience.abort(), PATIENCE_MS);
-    const either = AbortSignal.any([patience.signal, ...(signal ? [signal] : [])]);
-    return fetch(this.#address, { mode, credentials, signal: either, headers })
-      .catch(async (cause: unknown) => {
-        signal?.throwIfAborted();
-        if (patience.signal.aborted) throw unreachable(this.#address, new Error(NOTHING));
-        const isForbidden = mode === 'cors' && (await answersUnread(this.#address, either));
-        signal?.throwIfAborted();
-        throw isForbidden ? forbidden(this.#address, cause) : unreachable(this.#address, cause);
-      })
-      .finally(() => clearTimeout(timer));
+    return fetchPatiently(this.#address, { mode, credentials, signal, headers }).catch(async (cause: unknown) => {
+      signal?.throwIfAborted();
+      if (cause instanceof SilenceError) throw unreachable(this.#address, cause);
+      const isForbidden = mode === 'cors' && (await answersUnread(this.#address, signal));
+      signal?.throwIfAborted();
+      throw isForbidden ? forbidden(this.#address, cause) : unreachable(this.#address, cause);
+    });
   }
 }
 
@@ -154,40 +143,10 @@ async function answersUnread(address: URL, signal: AbortSignal | undefined): Pro
   const page = globalThis.location?.origin;
   if (page === undefined || page === address.origin || !address.protocol.startsWith('http')) return false;
   try {
-    await discard(await fetch(address, { mode: 'no-cors', credentials: 'omit', method: 'HEAD', signal }));
+    await discard(await fetchPatiently(address, { mode: 'no-cors', credentials: 'omit', method: 'HEAD', signal }));
     return true;
   } catch {
     return false;
-  }
-}
-
-/** A connection on which next to nothing comes for so long has broken without a word, ms. */
-const PATIENCE_MS = 30_000;
-/** Bytes that are more than next to nothing. */
-const PATIENCE_BYTES = 1024;
-const NOTHING = `nothing came for ${PATIENCE_MS / 1000} s`;
-
-/** Waits for the pieces of a body. */
-class Patience {
-  /** Milliseconds waited, and bytes come, since it was last enough. */
-  #waited = 0;
-  #bytes = 0;
-
-  /** The next piece, or a rejection where none comes. */
-  async read(reader: ReadableStreamDefaultReader<Uint8Array>): Promise<ReadableStreamReadResult<Uint8Array>> {
-    let timer: ReturnType<typeof setTimeout> | undefined;
-    const stalled = new Promise<never>((_, reject) => {
-      timer = setTimeout(() => {
-        reject(new Error(NOTHING));
-        void reader.cancel().catch(() => {});
-      }, PATIENCE_MS - this.#waited);
-    });
-    const start = performance.now();
-    const piece = await Promise.race([reader.read(), stalled]).finally(() => clearTimeout(timer));
-    this.#waited += performance.now() - start;
-    this.#bytes += piece.value?.length ?? 0;
-    if (this.#bytes >= PATIENCE_BYTES) this.#waited = this.#bytes = 0;
-    return piece;
   }
 }
 

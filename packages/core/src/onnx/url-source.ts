@@ -1,4 +1,5 @@
 import { GaussianSplatError } from '../errors.js';
+import { bytesOf, fetchPatiently, SilenceError } from '../patient-fetch.js';
 import { type ByteSource } from './byte-source.js';
 
 export interface UrlSourceOptions {
@@ -31,7 +32,7 @@ const RANGE_REFUSALS = [400, 405, 412, 416, 501];
 
 /**
  * Opens a file on a server for reading in pieces by HTTP Range; where the server or the browser refuses Range, the file is
- * fetched whole.
+ * fetched whole. A server that does not answer for 30 s is given up; a connection on which less than 1 KiB comes in 30 s counts as broken.
  *
  * @param url absolute, or relative to the page.
  * @throws GaussianSplatError `network/url`, `network/unreachable`, `network/status` or `network/interrupted`; the reason of
@@ -105,7 +106,8 @@ class RemoteFile implements UrlSource {
     } catch (error) {
       this.#options.signal?.throwIfAborted();
       // Where Range is not on a browser's safe list, it asks the other origin first, and many refuse.
-      if (error instanceof GaussianSplatError && error.code === 'network/unreachable') return undefined;
+      const isSilent = error instanceof GaussianSplatError && error.cause instanceof SilenceError;
+      if (error instanceof GaussianSplatError && error.code === 'network/unreachable' && !isSilent) return undefined;
       throw error;
     }
     if (response.status === 206 && isPlain(response)) return response;
@@ -144,7 +146,7 @@ class RemoteFile implements UrlSource {
   async #request(init: RequestInit): Promise<Response> {
     const { mode = 'cors', credentials = 'same-origin', signal } = this.#options;
     this.requests++;
-    return fetch(this.#address, { ...init, mode, credentials, signal }).catch((cause: unknown) => {
+    return fetchPatiently(this.#address, { ...init, mode, credentials, signal }).catch((cause: unknown) => {
       signal?.throwIfAborted();
       throw new GaussianSplatError('network/unreachable', {
         where: this.name,
@@ -158,18 +160,20 @@ class RemoteFile implements UrlSource {
   }
 
   async #body(response: Response): Promise<Uint8Array> {
-    const buffer = await response.arrayBuffer().catch((cause: unknown) => {
-      this.#options.signal?.throwIfAborted();
-      throw new GaussianSplatError('network/interrupted', {
-        where: this.name,
-        expected: 'the rest of the file',
-        found: `the end of the connection (${(cause as Error)?.message ?? 'unknown cause'})`,
-        remedy: 'load the model again; the connection broke off',
-        cause,
-      });
-    });
-    this.bytesReceived += buffer.byteLength;
-    return new Uint8Array(buffer);
+    const { signal } = this.#options;
+    const failed = (cause: unknown): unknown =>
+      signal?.aborted
+        ? signal.reason
+        : new GaussianSplatError('network/interrupted', {
+            where: this.name,
+            expected: 'the rest of the file',
+            found: `the end of the connection (${(cause as Error)?.message ?? 'unknown cause'})`,
+            remedy: 'load the model again; the connection broke off',
+            cause,
+          });
+    const bytes = await bytesOf(response, failed);
+    this.bytesReceived += bytes.length;
+    return bytes;
   }
 
   #badStatus({ status, statusText }: Response): GaussianSplatError {

@@ -4,6 +4,9 @@ import { ImageTensor, type ImageShape } from '@gaussian-splat/renderer';
 import { fetchBeside } from './model-files.js';
 import { valueOf, type ImageSource, type ImageSources } from './values.js';
 
+/** Bytes of an image file. */
+const MAX_IMAGE = 2 ** 28;
+
 export interface LivePicturesOptions {
   readonly credentials: RequestCredentials;
   readonly signal: AbortSignal;
@@ -155,8 +158,9 @@ async function pixelsOf(
 }
 
 async function fetchPicture(url: string, options: LivePicturesOptions): Promise<Blob> {
-  const response = await fetchBeside(url, options, 'the image that the control names', 'check the address');
-  return response.blob();
+  return new Blob([
+    await fetchBeside(url, options, MAX_IMAGE, 'the image that the control names', 'check the address'),
+  ]);
 }
 
 function ownSize(pixels: GPUCopyExternalImageSource): { width: number; height: number } {

@@ -1,5 +1,5 @@
 /** The files of models: their headers, which a worker reads, and what lies beside them. */
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { bytesOf, fetchPatiently, GaussianSplatError } from '@gaussian-splat/core';
 import type { ModelPlace, OpenedModel } from '@gaussian-splat/core/onnx';
 import type { ModelSource } from '@gaussian-splat/generator';
 import type { SceneLimits } from '../loading/protocol.js';
@@ -17,24 +17,28 @@ export function readsHeaders(loader: SceneLoader, limits: SceneLimits | undefine
 }
 
 /**
- * Fetches what belongs to a model: a contract, a picture.
+ * Fetches a contract or an image.
+ * @param maxBytes of the file
  * @param expected what the file ought to be, for people
  * @param remedy what to do without it
- * @throws GaussianSplatError `network/unreachable`, `network/status`; the reason of the signal.
+ * @throws GaussianSplatError `network/*`; the reason of the signal.
  */
 export async function fetchBeside(
   address: string,
   { credentials, signal }: { readonly credentials: RequestCredentials; readonly signal?: AbortSignal },
+  maxBytes: number,
   expected: string,
   remedy: string,
-): Promise<Response> {
+): Promise<Uint8Array<ArrayBuffer>> {
   const url = new URL(address, document.baseURI).href;
   const where = url.slice(0, 200);
-  const response = await fetch(url, { credentials, signal }).catch((cause: unknown) => {
+  const fail = (code: 'unreachable' | 'status' | 'interrupted', found: string, cause?: unknown): never => {
     signal?.throwIfAborted();
-    const found = (cause as Error).message;
-    throw new GaussianSplatError('network/unreachable', { where, expected, found, remedy, cause });
-  });
-  if (response.ok) return response;
-  throw new GaussianSplatError('network/status', { where, expected, found: `HTTP status ${response.status}`, remedy });
+    throw new GaussianSplatError(`network/${code}`, { where, expected, found, remedy, cause });
+  };
+  const response = await fetchPatiently(url, { credentials, signal }).catch((cause: Error) =>
+    fail('unreachable', cause.message, cause),
+  );
+  if (!response.ok) return fail('status', `HTTP status ${response.status}`);
+  return bytesOf(response, undefined, maxBytes).catch((cause: Error) => fail('interrupted', cause.message, cause));
 }

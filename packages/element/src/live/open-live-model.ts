@@ -15,6 +15,9 @@ import type { Contract } from '@gaussian-splat/core/contract';
 import { parseUp } from '../camera/grammar.js';
 import type { SceneBounds } from '../camera/settings.js';
 
+/** Bytes of a contract. */
+const MAX_CONTRACT = 2 ** 20;
+
 /** What a contract says of where its Gaussians are: bounds of the centres are those of the subject, too. Undefined where it says nothing. */
 export function declaredBounds(contract: Contract): SceneBounds | undefined {
   const { bounds } = contract;
@@ -155,13 +158,9 @@ async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<un
   const contract = typeof request.contract === 'string' ? request.contract.trim() : request.contract;
   if (typeof contract !== 'string' || contract === '' || contract.startsWith('{')) return contract || undefined;
   const remedy = 'check the address in the attribute contract, or leave it out';
-  const response = await fetchBeside(
-    contract,
-    { credentials, signal },
-    'the contract that the attribute names',
-    remedy,
-  );
-  return response.text();
+  const options = { credentials, signal };
+  const bytes = await fetchBeside(contract, options, MAX_CONTRACT, 'the contract that the attribute names', remedy);
+  return new TextDecoder().decode(bytes);
 }
 
 /** False for what the clock changes nothing of: it has nothing to play. Without `fps` no time tells a frame. */

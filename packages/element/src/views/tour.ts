@@ -1,3 +1,4 @@
+import { bytesOf, fetchPatiently } from '@gaussian-splat/core';
 import { css, html, nothing, render, type ReactiveController, type ReactiveControllerHost } from 'lit';
 import type { Behaviours } from '../behaviours.js';
 import type { Pose } from '../camera/orbit.js';
@@ -338,14 +339,17 @@ export class Tour implements ReactiveController, Mover {
   };
 }
 
+/** Bytes of a file of views: it is parsed on the page's thread. */
+const MAX_VIEWS = 2 ** 22;
+
 const NO_VIEWS: ViewList = { views: [], path: [] };
 
 async function readJson(source: string, base: string): Promise<unknown> {
   if (/^\s*[[{]/.test(source)) return JSON.parse(source);
   const url = new URL(source, base);
-  const response = await fetch(url);
+  const response = await fetchPatiently(url);
   if (!response.ok) throw new Error(`expected a JSON file at ${url.href}, found status ${response.status}`);
-  return response.json();
+  return JSON.parse(new TextDecoder().decode(await bytesOf(response, undefined, MAX_VIEWS)));
 }
 
 /** Beside what Lit renders, with a style sheet of its own. */

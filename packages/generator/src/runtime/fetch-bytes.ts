@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { bytesOf, chunksOf, fetchPatiently, GaussianSplatError } from '@gaussian-splat/core';
 
 /** Hears how many bytes have arrived, and of how many; undefined while that is not known. */
 export type ProgressListener = (loaded: number, total: number | undefined) => void;
@@ -15,7 +15,7 @@ export interface FetchOptions {
 }
 
 /**
- * A whole file; undefined where the server says that there is none and `mayBeMissing` allows it.
+ * A whole file, as patiently as scenes are fetched; undefined where the server says that there is none and `mayBeMissing` allows it.
  * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`; the reason of the signal.
  */
 export async function fetchBytes(
@@ -28,7 +28,7 @@ export async function fetchBytes(
   options: FetchOptions & { readonly mayBeMissing?: boolean } = {},
 ): Promise<Uint8Array<ArrayBuffer> | undefined> {
   const { credentials = 'same-origin', signal, mayBeMissing } = options;
-  const response = await fetch(url, { credentials, signal }).catch((cause: unknown) => {
+  const response = await fetchPatiently(url, { credentials, signal }).catch((cause: unknown) => {
     signal?.throwIfAborted();
     throw unreachable(url, cause);
   });
@@ -50,16 +50,15 @@ const FIRST_BYTES = 65_536;
 const MOST_AT_ONCE = 2 ** 28;
 
 async function readBody(response: Response, { onProgress, expected }: FetchOptions): Promise<Uint8Array<ArrayBuffer>> {
-  if (onProgress === undefined || response.body === null) return new Uint8Array(await response.arrayBuffer());
+  if (onProgress === undefined) return bytesOf(response);
   const length = Number(response.headers.get('Content-Length')) || undefined;
   const total = (response.headers.get('Content-Encoding') ? undefined : length) ?? expected;
   let bytes = new Uint8Array(Math.min(total ?? FIRST_BYTES, MOST_AT_ONCE));
   let loaded = 0;
-  const reader = response.body.getReader();
-  for (let step = await reader.read(); !step.done; step = await reader.read()) {
-    const end = loaded + step.value.length;
+  for await (const chunk of chunksOf(response)) {
+    const end = loaded + chunk.length;
     if (end > bytes.length) bytes = grown(bytes, Math.max(end, 2 * bytes.length));
-    bytes.set(step.value, loaded);
+    bytes.set(chunk, loaded);
     loaded = end;
     // A file that is longer than it was said to be ends somewhere behind what has arrived.
     onProgress(loaded, total && Math.max(loaded, total));

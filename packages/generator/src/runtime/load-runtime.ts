@@ -157,11 +157,18 @@ const REMEDY =
   `put these files of node_modules/onnxruntime-web/dist there (npm install onnxruntime-web@1.30.0): ${FILES}; ` +
   'or name their folder with GaussianSplatElement.runtimeLocation (without the element: setRuntimeLocation)';
 
+/** How long a script may take, ms: nobody sees how much of a module has arrived. */
+const SCRIPT_LIMIT_MS = 120_000;
+
 /** A module is evaluated once for each address: another copy needs another address. */
 async function importScript(script: string): Promise<Ort> {
   const address = copies++ === 0 ? script : `${script}?copy=${copies}`;
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const silence = new Promise<never>((_, reject) => {
+    timer = setTimeout(() => reject(new Error(`no end within ${SCRIPT_LIMIT_MS / 1000} s`)), SCRIPT_LIMIT_MS);
+  });
   try {
-    return (await import(/* @vite-ignore */ /* webpackIgnore: true */ address)) as Ort;
+    return (await Promise.race([import(/* @vite-ignore */ /* webpackIgnore: true */ address), silence])) as Ort;
   } catch (cause) {
     throw new GaussianSplatError('network/unreachable', {
       where: script.slice(0, 200),
@@ -171,6 +178,8 @@ async function importScript(script: string): Promise<Ort> {
       remedy: REMEDY,
       cause,
     });
+  } finally {
+    clearTimeout(timer);
   }
 }
 
