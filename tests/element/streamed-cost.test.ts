@@ -1,4 +1,7 @@
-/** A streamed SOG costs no more than its bytes allow: one account for all files, and a message to the page that is as long as the index. */
+/**
+ * A streamed SOG costs no more than its bytes allow: one account for all files, and a message to the page that is as long as the index.
+ * SECURITY.md: "A scene costs what it weighs".
+ */
 import assert from 'node:assert/strict';
 import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';

@@ -1,4 +1,7 @@
-/** Views in all the forms that pages and files have them, and the ways between them. */
+/**
+ * Views in all the forms that pages and files have them, and the ways between them.
+ * SECURITY.md: "The page lives on".
+ */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { cross, dot, eyeOf, lookAt, type Bounds, type Vector3 } from '@gaussian-splat/core';

@@ -1,4 +1,7 @@
-/** Which servers manifests may name files on: SECURITY.md has the rule. */
+/**
+ * Which servers manifests may name files on: SECURITY.md has the rule.
+ * SECURITY.md: "Manifests name files of their own server".
+ */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError, partRequest } from '@gaussian-splat/core';

@@ -1,4 +1,7 @@
-/** Cut, damaged and random files: every one is read or refused with a named error, soon and with little memory. */
+/**
+ * Cut, damaged and random files: every one is read or refused with a named error, soon and with little memory.
+ * SECURITY.md: "Scene and model files are data from strangers".
+ */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';

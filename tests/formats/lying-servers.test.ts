@@ -1,10 +1,14 @@
-/** Servers that are slow, silent, broken or lie: a download ends with the right bytes or a named error, in bounded time and with a bounded number of requests, and never with two files in one. */
+/**
+ * Servers that are slow, silent, broken or lie: a download ends with the right bytes or a named error, in bounded time and with a bounded number of requests, and never with two files in one.
+ * SECURITY.md: "Downloads end".
+ */
 import assert from 'node:assert/strict';
 import { createServer, type IncomingMessage, type ServerResponse } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, beforeEach, mock, test } from 'node:test';
 import { gzipSync } from 'node:zlib';
-import { GaussianSplatError, openUrl } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { openUrl } from '@gaussian-splat/core/onnx';
 import { fetchScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { fetchBytes } from '../../packages/generator/src/runtime/fetch-bytes.js';
 

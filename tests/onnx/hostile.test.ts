@@ -1,4 +1,7 @@
-/** Damaged and hostile files: every one ends quickly, in a header or in an error that names the file. */
+/**
+ * Damaged and hostile files: every one ends quickly, in a header or in an error that names the file.
+ * SECURITY.md: "Scene and model files are data from strangers".
+ */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';

@@ -114,18 +114,21 @@ test('gaussian-splat page brings what descriptions in JSON name, and what these 
   }
 });
 
-test('gaussian-splat page brings files, not links to them, and says what it cannot bring', () => {
+test('gaussian-splat page copies files, not links to them, none from outside of the folder, and says what it cannot copy', () => {
   mkdirSync(inFolder('links', 'scene'), { recursive: true });
   writeFileSync(inFolder('links', 'real.ply'), 'ply');
   symlinkSync('../real.ply', inFolder('links', 'scene', 'a.ply'));
   assert.deepEqual(filesOfPage('links/scene/a.ply'), ['a.ply']);
   const buffers = [{ uri: '../real.ply' }, { uri: 'a.ply?version=1#here' }, { uri: 'missing.bin' }];
-  writeFileSync(inFolder('links', 'scene', 'a.gltf'), JSON.stringify({ asset: { version: '2.0' }, buffers }));
-  assert.deepEqual(filesOfPage('links/scene/a.gltf'), ['a.gltf', 'a.ply']);
+  const images = [{ uri: 'c.ply' }];
+  writeFileSync(inFolder('links', 'scene', 'a.gltf'), JSON.stringify({ asset: { version: '2.0' }, buffers, images }));
+  writeFileSync(inFolder('links', 'scene', 'b.ply'), 'ply');
+  symlinkSync('b.ply', inFolder('links', 'scene', 'c.ply'));
+  assert.deepEqual(filesOfPage('links/scene/a.gltf'), ['a.gltf', 'c.ply']);
   const { text } = command('page', 'links/scene/a.gltf', 'page', '--no-serve');
   assert.match(
     text,
-    /names files that were not copied: \.\.\/real\.ply \(outside of its folder\), missing\.bin \(not there\)/,
+    /names files that were not copied: \.\.\/real\.ply \(outside of its folder\), a\.ply \(a link out of its folder\), missing\.bin \(not there\)/,
   );
   rmSync(inFolder('page'), { recursive: true });
 });

@@ -1,4 +1,4 @@
-/** A server that does not answer for so long is given up; a connection on which less than 1 KiB arrives in that time counts as broken, ms. */
+/** Milliseconds after which a server that does not answer is given up, and a connection on which less than 1 KiB has arrived counts as broken. */
 export const PATIENCE_MS = 30_000;
 const PATIENCE_BYTES = 1024;
 
@@ -51,7 +51,7 @@ export async function* chunksOf(
   }
 }
 
-/** A whole body. Rejects as {@link chunksOf} throws. @param maxBytes beyond so many it rejects with a RangeError */
+/** A whole body. Rejects as {@link chunksOf} throws. @param maxBytes of a longer body it rejects with a RangeError */
 export async function bytesOf(
   response: Response,
   failed?: (cause: unknown) => unknown,

@@ -57,7 +57,8 @@ function show() {
   for (const [name, value] of query) {
     if (!ALLOWED.includes(name)) continue;
     if (name === 'camera-controls' && value === 'false') scene.removeAttribute(name);
-    else (OF_SCENE.includes(name) ? holder : scene).setAttribute(name, ADDRESSES.includes(name) ? allowed(name) : value);
+    else
+      (OF_SCENE.includes(name) ? holder : scene).setAttribute(name, ADDRESSES.includes(name) ? allowed(name) : value);
   }
   document.title = query.get('alt') || document.title;
   document.querySelector('main').append(scene);

@@ -166,7 +166,7 @@ export class GaussianSplatElement extends ViewingMethods {
   constructor() {
     super();
     this.#attributes = this.#readAttributes();
-    this.#internals = isServer ? null : this.attachInternals();
+    this.#internals = (!isServer && this.attachInternals?.()) || null;
     this.stage = new Stage(this, GaussianSplatElement.#hostOf(this));
   }
 

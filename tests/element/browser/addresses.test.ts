@@ -1,4 +1,7 @@
-/** What pages are spared whose visitors choose the scenes: requests to other servers, endless requests for what is missing, scenes beyond their limits. */
+/**
+ * What pages are spared whose visitors choose the scenes: requests to other servers, endless requests for what is missing, scenes beyond their limits.
+ * SECURITY.md: "Pages set their own limits", "Manifests name files of their own server".
+ */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { assert, assertEqual, COMPASS, delay, nextEvent, show, until } from './support/harness.js';

@@ -1,3 +1,4 @@
+/** SECURITY.md: "No text becomes markup", "A strict Content-Security-Policy is enough". */
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { assert, assertEqual, COMPASS, FIXTURES, nextEvent, show, until } from './support/harness.js';
 import { isRed, screenOf } from './support/screen.js';
@@ -100,6 +101,16 @@ describe('the CDN build', () => {
     const report = await reportOf('/net/secure-page');
     assertEqual([report.loaded, report.error, report.prompt], [true, undefined, true], 'loaded, error, prompt');
     assertEqual([report.violations, report.warnings], [[], []], 'violations and warnings');
+  });
+
+  it("shows textured meshes there, and compressed ones with 'wasm-unsafe-eval'", async () => {
+    const textured = await reportOf(`/net/secure-page?mesh=${FIXTURES}textured.glb`);
+    assertEqual([textured.loaded, textured.mesh], [true, [true, null]], 'a texture within a GLB');
+    assertEqual([textured.violations, textured.warnings], [[], []], 'violations and warnings');
+    const meshopt = await reportOf(`/net/secure-page?wasm&mesh=${FIXTURES}meshopt.glb`);
+    assertEqual([meshopt.mesh, meshopt.violations], [[true, null], []], 'meshopt');
+    const refused = (await reportOf(`/net/secure-page?mesh=${FIXTURES}meshopt.glb`)).mesh as [boolean, string];
+    assert(!refused[0] && refused[1].includes("allow 'wasm-unsafe-eval'"), `named where it is refused: ${refused[1]}`);
   });
 
   it("runs a generator there with 'wasm-unsafe-eval', and nothing more", async () => {

@@ -1,3 +1,4 @@
+/** SECURITY.md: "The page lives on". */
 import '@gaussian-splat/element';
 import { GaussianSplatElement, SharedDevice } from '@gaussian-splat/element';
 import { itInLab } from '../../support/extent-in-pages.js';

@@ -1,4 +1,7 @@
-/** The page for iframes: what its address may ask for. */
+/**
+ * The page for iframes: what its address may ask for.
+ * SECURITY.md: "No text becomes markup".
+ */
 import { emulateMedia } from '@web/test-runner-commands';
 import { violations } from './support/axe.js';
 import { assert, assertEqual, COMPASS, nextEvent, until } from './support/harness.js';

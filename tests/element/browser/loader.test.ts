@@ -1,3 +1,4 @@
+/** SECURITY.md: "Requests are those of `<img crossorigin>`". */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import {
   assert,

@@ -1,4 +1,7 @@
-/** Loads that never end, and workers that die: nobody else waits for them. */
+/**
+ * Loads that never end, and workers that die: nobody else waits for them.
+ * SECURITY.md: "No visitor waits for a stranger's scene".
+ */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import {
   assert,

@@ -1,11 +1,11 @@
-import { existsSync, readFileSync } from 'node:fs';
-import { basename, dirname, extname, join, posix } from 'node:path';
+import { existsSync, readFileSync, realpathSync } from 'node:fs';
+import { basename, dirname, extname, join, posix, sep } from 'node:path';
 
 /** Where descriptions in JSON name files: SOG, streamed SOG, pages of detail, sequences. */
 const KEYS = new Set(['files', 'filenames', 'environment', 'file', 'frames']);
 
 /**
- * Files that a scene or a model needs beside it, as paths from its folder: buffers of a glTF, weights and contract of a model, what a description in JSON names and what that
+ * Files that a scene or a model needs beside it, as paths from its folder: buffers and images of a glTF, weights and contract of a model, what a description in JSON names and what that
  * names. `missing`: those that are not there or lie outside of the folder, and why. A file that is damaged names none: the page says what is wrong. Needs built packages.
  */
 export async function filesBeside(scene) {
@@ -17,6 +17,7 @@ export async function filesBeside(scene) {
       const file = posix.join(folder, name);
       if (!isInside(file)) missing.set(file, 'outside of its folder');
       else if (!existsSync(join(dirname(scene), file))) missing.set(file, 'not there');
+      else if (leadsOut(scene, file)) missing.set(file, 'a link out of its folder');
       else if (!found.has(file)) {
         found.add(file);
         if (isJson(file)) await visit(file);
@@ -25,9 +26,15 @@ export async function filesBeside(scene) {
   };
   await visit(basename(scene));
   const contract = sidecarOf(scene, await import('@gaussian-splat/core/contract'));
-  if (contract && existsSync(join(dirname(scene), contract))) found.add(contract);
+  if (contract && existsSync(join(dirname(scene), contract)) && !leadsOut(scene, contract)) found.add(contract);
   return { found: [...found], missing: [...missing].map(([file, why]) => `${file} (${why})`) };
 }
+
+/** Archives and clones of strangers may have links to any file of this machine. */
+const leadsOut = (scene, file) => {
+  const folder = realpathSync(dirname(scene));
+  return !realpathSync(join(folder, file)).startsWith(folder.endsWith(sep) ? folder : folder + sep);
+};
 
 const isJson = (path) => extname(path).toLowerCase() === '.json';
 
@@ -41,8 +48,8 @@ async function namedBy(file) {
 }
 
 async function buffersOf(file) {
-  const { buffers = [] } = JSON.parse(readFileSync(file, 'utf8'));
-  return buffers.flatMap(({ uri }) =>
+  const { buffers = [], images = [] } = JSON.parse(readFileSync(file, 'utf8'));
+  return [...buffers, ...images].flatMap(({ uri }) =>
     // What follows the path is for servers.
     uri === undefined || /^[a-z]+:/i.test(uri) ? [] : [decodeURIComponent(uri.replace(/[?#].*$/, ''))],
   );

@@ -4,6 +4,9 @@ import type { ReactiveController, ReactiveControllerHost } from 'lit';
 export const windowOf = ({ ownerDocument }: Node): Window & typeof globalThis =>
   (ownerDocument?.defaultView as (Window & typeof globalThis) | null | undefined) ?? window;
 
+/** Dense displays have 4, and zooming multiplies it by 5 at most. */
+const MAX_RATIO = 20;
+
 /** A size in whole device pixels. */
 export interface PixelSize {
   readonly width: number;
@@ -54,9 +57,10 @@ export class SizeController implements ReactiveController {
     return width === 0 || height === 0;
   }
 
-  /** Device pixels for one CSS pixel. */
+  /** Device pixels for one CSS pixel; scripts of the page may have replaced it by anything. */
   get #pixelRatio(): number {
-    return this.#canvas ? windowOf(this.#canvas).devicePixelRatio : devicePixelRatio;
+    const ratio = this.#canvas ? windowOf(this.#canvas).devicePixelRatio : devicePixelRatio;
+    return ratio > 0 ? Math.min(ratio, MAX_RATIO) : 1;
   }
 
   hostConnected(): void {
@@ -81,7 +85,7 @@ export class SizeController implements ReactiveController {
     this.#canvas = canvas;
     if (this.#canvas === null || this.#observer !== undefined) return;
     const { ResizeObserver } = windowOf(this.#canvas);
-    if (!ResizeObserver) return;
+    if (!ResizeObserver) return this.#setFromCss(this.#canvas.clientWidth, this.#canvas.clientHeight);
     this.#observer = new ResizeObserver((entries) => this.#update(entries[entries.length - 1]));
     try {
       // Exact device pixels, also where the element's edges lie between them.

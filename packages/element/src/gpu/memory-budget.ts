@@ -12,7 +12,7 @@ export function defaultMemoryBudget(): number | undefined {
   // The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more. Safari says
   // nothing, and ends pages on phones that take more than some of what there is.
   const { deviceMemory = isHandheld() ? 1 : undefined } = navigator as { deviceMemory?: number };
-  return deviceMemory === undefined ? undefined : deviceMemory * 2 ** 29;
+  return deviceMemory! > 0 ? deviceMemory! * 2 ** 29 : undefined;
 }
 
 /** Bytes of the page's memory that a load may take where the page says nothing: a splat takes several times as many there, as file and as numbers, as on the GPU. */

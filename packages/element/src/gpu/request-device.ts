@@ -8,7 +8,11 @@ export const why = async (reason: (of: typeof reasons) => GaussianSplatError): P
 
 /** Rejects with the reason, if there is one, why this page has no WebGPU at all. */
 export async function assertWebGpu(): Promise<void> {
-  if (typeof navigator !== 'undefined' && 'gpu' in navigator && navigator.gpu) return;
+  try {
+    if (typeof navigator !== 'undefined' && navigator.gpu) return;
+  } catch {
+    // An extension for privacy has made it throw.
+  }
   throw await why(({ noWebGpu }) => noWebGpu());
 }
 

@@ -2,7 +2,7 @@
 import { createReadStream, existsSync, readFileSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { extname, join, normalize } from 'node:path';
-import { Readable } from 'node:stream';
+import { PassThrough, Readable } from 'node:stream';
 import { setTimeout as delay } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
 import { constants, deflateRawSync, gzipSync } from 'node:zlib';
@@ -56,6 +56,7 @@ const DROP = 16_384;
 
 /** By folder: what tests have put there, and what was asked for. */
 const kept = new Map();
+const stuck = new Map();
 
 /** Bytes a second of the link behind `/net/metered/`: 20 Mbit. */
 const METERED_RATE = 2.5e6;
@@ -330,6 +331,17 @@ const ANSWERS = {
     }
   },
 
+  /** Sends a byte and nothing more. `NAME/open` tells how many connections for a name are open. */
+  stuck(context, path) {
+    const [name, ...rest] = path.split('/');
+    if (rest.join() === 'open') return void (context.body = String(stuck.get(name) ?? 0));
+    stuck.set(name, (stuck.get(name) ?? 0) + 1);
+    context.res.on('close', () => stuck.set(name, stuck.get(name) - 1));
+    const body = new PassThrough();
+    body.write('a');
+    context.body = body;
+  },
+
   'soak-cycles'(context) {
     context.body = process.env.SOAK_CYCLES ?? '100';
   },
@@ -350,19 +362,21 @@ const ANSWERS = {
       <gaussian-splat src="/tests/element/browser/fixtures/compass.ply" loading="eager" camera-controls></gaussian-splat>`;
   },
 
-  /** The policy that the README recommends, Trusted Types included; `?generator` adds what WebAssembly needs. */
+  /** The policy that the README recommends, Trusted Types included; `?generator` and `?wasm` add what WebAssembly needs. `?mesh=ADDRESS` shows a mesh, too. */
   'secure-page'(context) {
-    const wasm = 'generator' in context.query ? " 'wasm-unsafe-eval'" : '';
+    const isGenerator = 'generator' in context.query;
+    const wasm = isGenerator || 'wasm' in context.query ? " 'wasm-unsafe-eval'" : '';
+    const { mesh } = context.query;
     context.set(
       'Content-Security-Policy',
       `default-src 'none'; script-src 'self'${wasm}; worker-src 'self'; connect-src 'self'; img-src 'self'; style-src 'self'; ` +
         "require-trusted-types-for 'script'; trusted-types lit-html gaussian-splat",
     );
     context.type = 'text/html';
-    const src = wasm ? '/tests/fixtures/generators/packed.onnx' : '/tests/element/browser/fixtures/compass.ply';
+    const src = isGenerator ? '/tests/fixtures/generators/packed.onnx' : '/tests/element/browser/fixtures/compass.ply';
     context.body = `<!doctype html><title>Secure</title>
       <script src="/net/strict-script" type="module"></script>
-      <gaussian-splat src="${src}" loading="eager" camera-controls interaction-prompt-threshold="0" auto-rotate></gaussian-splat>`;
+      <gaussian-splat src="${src}" loading="eager" camera-controls interaction-prompt-threshold="0" auto-rotate>${mesh ? `<splat-mesh src="${mesh}"></splat-mesh>` : ''}</gaussian-splat>`;
   },
 
   /** A page as the README has it: one script tag from another origin, with its integrity. */
@@ -411,8 +425,9 @@ const ANSWERS = {
       const element = document.querySelector('gaussian-splat');
       await element.ready;
       await new Promise((resolve) => setTimeout(resolve, 200));
+      const mesh = document.querySelector('splat-mesh');
       const workers = performance.getEntriesByType('resource').filter(({ name }) => name.endsWith('/scene-worker.js')).length;
-      parent.postMessage({ ...seen, loaded: element.loaded, error: element.error?.message, workers,
+      parent.postMessage({ ...seen, loaded: element.loaded, error: element.error?.message, workers, mesh: mesh && [mesh.loaded, mesh.error?.message ?? null],
         prompt: element.shadowRoot.querySelector('[part=prompt]') !== null }, '*');`;
   },
 };

@@ -1,0 +1,135 @@
+/**
+ * Files of meshes are data from strangers as those of scenes are. SECURITY.md: "Pages set their own limits", "Manifests name files of their own server", "Downloads end", "A scene that asks for too much
+ * harms itself".
+ * SECURITY.md: "A scene that asks for too much harms itself".
+ */
+import '@gaussian-splat/element/scenes.js';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import type { SplatMeshElement } from '@gaussian-splat/element/scenes.js';
+import { boxGlb } from './support/glb.js';
+import { assert, assertEqual, FIXTURES, frames, until } from './support/harness.js';
+import { holdings } from './support/ledger.js';
+import { comesToShow, type Rgb } from './support/screen.js';
+
+const FOLDER = '/net/kept/meshes/';
+const keep = (name: string, body: BodyInit): Promise<unknown> => fetch(FOLDER + name, { method: 'PUT', body });
+
+const triangle = {
+  asset: { version: '2.0' },
+  scene: 0,
+  scenes: [{ nodes: [0] }],
+  nodes: [{ mesh: 0 }],
+  meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }],
+  accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: 'VEC3' }],
+  bufferViews: [{ buffer: 0, byteLength: 36 }],
+};
+const CORNERS = Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0);
+const corners = btoa(String.fromCharCode(...new Uint8Array(CORNERS.buffer)));
+const withBuffer = (uri: string): string => JSON.stringify({ ...triangle, buffers: [{ byteLength: 36, uri }] });
+
+/** A mesh alone; removed by the test after each case. */
+async function meshOf(src: string | File): Promise<SplatMeshElement> {
+  const element = document.createElement('gaussian-splat');
+  element.style.cssText = 'display: block; width: 120px; height: 100px';
+  const mesh = document.createElement('splat-mesh') as SplatMeshElement;
+  mesh.src = src;
+  element.append(mesh);
+  document.body.append(element);
+  return mesh;
+}
+
+async function reasonOf(src: string | File): Promise<string> {
+  const mesh = await meshOf(src);
+  await until(() => mesh.loaded || mesh.error !== null, 'the mesh, or its error', 60_000);
+  const reason = mesh.error?.reason ?? 'shown';
+  mesh.parentElement!.remove();
+  return reason;
+}
+
+describe('files of meshes', () => {
+  afterEach(() => {
+    GaussianSplatElement.sceneLimits = {};
+    document.body.replaceChildren();
+  });
+
+  it('textures within a GLB, buffers in the JSON, and meshopt are shown', async () => {
+    const textured = await meshOf(`${FIXTURES}textured.glb`);
+    await until(() => textured.loaded || textured.error !== null, 'the textured mesh', 60_000);
+    assertEqual(textured.error, null, `${textured.error?.message}`);
+    const isDrawn = ([r, g, b]: Rgb): boolean => r + g + b > 60;
+    await comesToShow(textured.parentElement!, (screen) => screen.middleOf(isDrawn) !== null);
+    textured.parentElement!.remove();
+    await keep('data.gltf', withBuffer(`data:application/octet-stream;base64,${corners}`));
+    assertEqual(await reasonOf(`${FOLDER}data.gltf`), 'shown', 'a buffer in the JSON');
+    assertEqual(await reasonOf(`${FIXTURES}meshopt.glb`), 'shown', 'meshopt');
+  });
+
+  it('ask their own server alone, and those that the page allows', async () => {
+    const foreign = await (await fetch('/net/other-origin')).text();
+    await keep('corners.bin', CORNERS);
+    await keep('own.gltf', withBuffer('corners.bin'));
+    await keep('foreign.gltf', withBuffer(`${foreign}/fixtures/compass.splat`));
+    assertEqual(await reasonOf(`${FOLDER}own.gltf`), 'shown', 'a buffer beside it');
+    const isAsked = (): boolean =>
+      performance.getEntriesByType('resource').some(({ name }) => name.startsWith(`${foreign}/fixtures`));
+    assertEqual(await reasonOf(`${FOLDER}foreign.gltf`), 'decode/unsupported', 'one on another server');
+    assert(!isAsked(), 'no request leaves the server');
+    GaussianSplatElement.sceneLimits = { origins: [foreign] };
+    assertEqual(await reasonOf(`${FOLDER}foreign.gltf`), 'shown', 'one that the page allows');
+  });
+
+  it('cost no more than the budgets allow, of the load, the page and the GPU', async () => {
+    await keep(
+      'many.gltf',
+      JSON.stringify({ ...triangle, accessors: [{ componentType: 5126, count: 5e7, type: 'VEC3' }] }),
+    );
+    assertEqual(await reasonOf(`${FOLDER}many.gltf`), 'out-of-memory/budget', 'the budget of the load');
+    GaussianSplatElement.sceneLimits = { maxBytes: 1_000 };
+    assertEqual(await reasonOf(boxGlb()), 'out-of-memory/budget', 'sceneLimits.maxBytes');
+    GaussianSplatElement.sceneLimits = {};
+    const before = GaussianSplatElement.memoryBudget;
+    GaussianSplatElement.memoryBudget = 100;
+    assertEqual(await reasonOf(boxGlb()), 'out-of-memory/budget', 'memoryBudget');
+    GaussianSplatElement.memoryBudget = before;
+    const box = await meshOf(boxGlb());
+    await until(() => box.loaded, 'a mesh within them', 60_000);
+    assert(holdings().bytes > 0, 'the ledger of the device has the mesh');
+  });
+
+  it('triangles beyond the budget leave the splats of the same file, and the page can know', async () => {
+    const bytes = new Uint8Array(await boxGlb({ splat: [0, 0, 0] }).arrayBuffer());
+    const length = new DataView(bytes.buffer).getUint32(12, true);
+    const text = new TextDecoder().decode(bytes.subarray(20, 20 + length));
+    // The accessor of the box's corners is the first.
+    const changed = text.replace('"count":24', `"count":9e7`).padEnd(length);
+    assert(changed.length === length && changed !== text, 'as long as before');
+    bytes.set(new TextEncoder().encode(changed), 20);
+    const element = document.createElement('gaussian-splat');
+    element.src = new File([bytes], 'both.glb');
+    document.body.append(element);
+    await until(() => element.loaded || element.error !== null, 'the splats', 60_000);
+    assertEqual(element.error, null, 'error');
+    await until(
+      () => element.stats?.warnings.some((text) => /triangles are not shown/.test(text)) === true,
+      'a warning',
+    );
+  });
+
+  it('removal ends their requests', async () => {
+    await keep('stuck.gltf', withBuffer('/net/stuck/mesh'));
+    const mesh = await meshOf(`${FOLDER}stuck.gltf`);
+    const open = async (): Promise<number> => Number(await (await fetch('/net/stuck/mesh/open')).text());
+    let count = 0;
+    const isOpen = async (expected: number): Promise<void> => {
+      for (let i = 0; i < 100 && count !== expected; i++) {
+        await frames();
+        count = await open();
+      }
+      assertEqual(count, expected, 'open connections');
+    };
+    await isOpen(1);
+    mesh.parentElement!.remove();
+    await new Promise((resolve) => setTimeout(resolve, GaussianSplatElement.releaseDelay));
+    await isOpen(0);
+  });
+});
