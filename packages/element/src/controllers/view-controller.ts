@@ -219,7 +219,9 @@ export class ViewController implements FrameClient {
 
   /** null where there is no size. */
   #pixelsOf({ device }: Painter): PixelSize | null {
-    return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, device.limits.maxTextureDimension2D);
+    const { size, attributes, shown } = this.#host;
+    const share = Math.min(1, ...shown.map(({ pixelShare }) => pixelShare));
+    return size.pixelSize(attributes.maxPixelRatio, device.limits.maxTextureDimension2D, share);
   }
 
   #render(painter: Painter, request: CanvasFrame, now: number, cameraMoved: boolean): void {

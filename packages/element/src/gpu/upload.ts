@@ -14,12 +14,14 @@ export interface SceneUploadOptions {
 /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
 export async function upload(
   lease: DeviceLease,
-  { packed, bounds, warnings, order, hasMeshes }: LoadedScene,
+  { packed, bounds, pixelShare = 1, warnings, order, hasMeshes }: LoadedScene,
   { signal, memoryBudget, submissions }: SceneUploadOptions,
 ): Promise<LoadedGaussians> {
   const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
   if (!signal.aborted)
-    return new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes });
+    return Object.assign(new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes }), {
+      pixelShare,
+    });
   gaussians.destroy();
   throw signal.reason;
 }

@@ -11,6 +11,7 @@ import {
   type LoadLimits,
 } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
+import { limitOverdraw } from './coverage.js';
 import type { LargePly } from './large-ply.js';
 import type { PreviewSchedule } from './preview-schedule.js';
 import type * as sequences from './sequence-of.js';
@@ -58,10 +59,10 @@ export async function loadScene(
       ...{ mode: 'cors', credentials, signal, onProgress: progress.add() },
       ...fileLimits(limits()),
     });
-    const pack = (cloud: GaussianCloud): LoadedScene => ({
+    const pack = (cloud: GaussianCloud, bounds = boundsOf(cloud)): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
-      bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
-      warnings: cloud.warnings,
+      bounds: { ...bounds, up: cloud.hints?.up },
+      ...limitOverdraw(cloud, bounds),
       order: cloud.hints?.order,
       hasMeshes: cloud.hints?.meshes,
     });
@@ -103,7 +104,8 @@ export async function loadScene(
     onReading?.(true);
     if (cloud.levelRuns === undefined) return pack(cloud);
     const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
-    return packLevels(cloud, request.sh);
+    const overdraw = limitOverdraw(cloud, boundsOf(cloud));
+    return { ...packLevels(cloud, request.sh), ...overdraw };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(request.url));

@@ -62,6 +62,8 @@ export interface LoadedScene {
   readonly bounds: SceneBounds;
   /** What of the file is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
+  /** Share of the pixels of each side that frames are drawn with, 0..1; absent for all: see `limitOverdraw`. */
+  readonly pixelShare?: number;
   /** What splats are ordered by, where the file tells: see `CloudHints.order`. */
   readonly order?: 'pixel' | undefined;
   /** The file has triangles, too. */

@@ -29,10 +29,11 @@ export class GlLoaded extends LoadedGaussians {
     lease: GlLease,
     frames: GlRenderer,
     gaussians: OwnedGaussians,
-    { packed, bounds, warnings = [], hasMeshes = false }: LoadedScene,
+    { packed, bounds, pixelShare = 1, warnings = [], hasMeshes = false }: LoadedScene,
     spawn: () => Worker,
   ) {
     super(lease, gaussians, bounds, 1, { warnings: hasMeshes ? [...warnings, NO_MESHES] : warnings });
+    this.pixelShare = pixelShare;
     this.lease = lease;
     this.frames = frames;
     this.spawn = spawn;

@@ -53,7 +53,7 @@ export async function readTriangles({ bytes, name, budget, openUri }: TriangleSo
   const file = openContainer({ bytes, name, budget }, KNOWN);
   const document = new GltfDocument(file, { name, budget }, { uri: openUri });
   const survey = new Survey(document);
-  if (survey.triangles === 0 && survey.meshes.size === 0) throw noTriangles(name);
+  if (survey.draws === 0) throw noTriangles(name);
   const images = new Images(document, survey);
   const views = new Views(document, survey);
   const files = await images.read();

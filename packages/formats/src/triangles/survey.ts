@@ -30,7 +30,8 @@ export class Survey {
   readonly lit = new Set<number>();
   /** Lights that are not shown. */
   darkLights = 0;
-  /** Triangles that a frame draws. */
+  /** Primitives that a frame draws, and their triangles. */
+  draws = 0;
   triangles = 0;
   /** Bytes that copies of accessors take: morph targets, instances, joints. */
   copies = 0;
@@ -76,6 +77,7 @@ export class Survey {
     const primitives = this.primitivesOf(mesh);
     const isNew = !this.meshes.has(mesh);
     this.meshes.add(mesh);
+    this.draws += primitives.length;
     document.take(DRAW_BYTES * primitives.length);
     for (const [k, primitive] of primitives.entries()) {
       const path = `meshes[${mesh}].primitives[${k}]`;
