@@ -292,7 +292,7 @@ test('a path of many keyframes costs each frame next to nothing, however wound i
 
 test('views that somebody else has written: long numbers are read in linear time', () => {
   const before = process.cpuUsage();
-  for (const grammar of [orbitGrammar('auto'), targetGrammar, fieldOfViewGrammar, ATTRIBUTES.detail.grammar])
+  for (const grammar of [orbitGrammar('auto'), targetGrammar, fieldOfViewGrammar, ATTRIBUTES.detail.grammar!])
     assert.equal(grammar.parse(`${'9'.repeat(200_000)}!`), null);
   const { user } = process.cpuUsage(before);
   assert.ok(user < 0.5e6, `${user / 1e3} ms`);
