@@ -42,7 +42,7 @@ function allowed(name) {
 function restrict() {
   const policy = document.createElement('meta');
   policy.httpEquiv = 'Content-Security-Policy';
-  const sources = ["'self'", ...origins].join(' ');
+  const sources = [location.origin, ...origins].join(' ');
   policy.content = `connect-src ${sources}; img-src ${sources} blob: data:`;
   document.head.append(policy);
 }

@@ -1,5 +1,6 @@
 /** SECURITY.md: "No text becomes markup", "A strict Content-Security-Policy is enough". */
 import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { assert, assertEqual, COMPASS, FIXTURES, nextEvent, show, until } from './support/harness.js';
 import { isRed, screenOf } from './support/screen.js';
 
@@ -103,7 +104,7 @@ describe('the CDN build', () => {
     assertEqual([report.violations, report.warnings], [[], []], 'violations and warnings');
   });
 
-  it("shows textured meshes there, and compressed ones with 'wasm-unsafe-eval'", async () => {
+  itInLab("shows textured meshes there, and compressed ones with 'wasm-unsafe-eval'", async () => {
     const textured = await reportOf(`/net/secure-page?mesh=${FIXTURES}textured.glb`);
     assertEqual([textured.loaded, textured.mesh], [true, [true, null]], 'a texture within a GLB');
     assertEqual([textured.violations, textured.warnings], [[], []], 'violations and warnings');

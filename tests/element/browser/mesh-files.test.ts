@@ -6,6 +6,7 @@
 import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatMeshElement } from '@gaussian-splat/element/scenes.js';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { boxGlb } from './support/glb.js';
 import { assert, assertEqual, FIXTURES, frames, until } from './support/harness.js';
 import { holdings } from './support/ledger.js';
@@ -20,7 +21,7 @@ const triangle = {
   scenes: [{ nodes: [0] }],
   nodes: [{ mesh: 0 }],
   meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }],
-  accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: 'VEC3' }],
+  accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: 'VEC3', min: [0, 0, 0], max: [1, 1, 0] }],
   bufferViews: [{ buffer: 0, byteLength: 36 }],
 };
 const CORNERS = Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0);
@@ -64,7 +65,7 @@ describe('files of meshes', () => {
     assertEqual(await reasonOf(`${FIXTURES}meshopt.glb`), 'shown', 'meshopt');
   });
 
-  it('ask their own server alone, and those that the page allows', async () => {
+  itInLab('ask their own server alone, and those that the page allows', async () => {
     const foreign = await (await fetch('/net/other-origin')).text();
     await keep('corners.bin', CORNERS);
     await keep('own.gltf', withBuffer('corners.bin'));
@@ -78,7 +79,7 @@ describe('files of meshes', () => {
     assertEqual(await reasonOf(`${FOLDER}foreign.gltf`), 'shown', 'one that the page allows');
   });
 
-  it('cost no more than the budgets allow, of the load, the page and the GPU', async () => {
+  itInLab('cost no more than the budgets allow, of the load, the page and the GPU', async () => {
     await keep(
       'many.gltf',
       JSON.stringify({ ...triangle, accessors: [{ componentType: 5126, count: 5e7, type: 'VEC3' }] }),
@@ -96,7 +97,7 @@ describe('files of meshes', () => {
     assert(holdings().bytes > 0, 'the ledger of the device has the mesh');
   });
 
-  it('triangles beyond the budget leave the splats of the same file, and the page can know', async () => {
+  itInLab('triangles beyond the budget leave the splats of the same file, and the page can know', async () => {
     const bytes = new Uint8Array(await boxGlb({ splat: [0, 0, 0] }).arrayBuffer());
     const length = new DataView(bytes.buffer).getUint32(12, true);
     const text = new TextDecoder().decode(bytes.subarray(20, 20 + length));
@@ -115,7 +116,7 @@ describe('files of meshes', () => {
     );
   });
 
-  it('removal ends their requests', async () => {
+  itInLab('removal ends their requests', async () => {
     await keep('stuck.gltf', withBuffer('/net/stuck/mesh'));
     const mesh = await meshOf(`${FOLDER}stuck.gltf`);
     const open = async (): Promise<number> => Number(await (await fetch('/net/stuck/mesh/open')).text());
