@@ -138,6 +138,14 @@ describe('previews on show', () => {
     assertEqual(found, expected, 'camera');
   });
 
+  it('a slow file with loading="eager" is seen part by part, too', async () => {
+    const element = show({ src: '/net/ball/red.splat?ms=4000&eager', loading: 'eager' });
+    const seen = await Promise.race([nextEvent<CustomEvent<{ splats: number }>>(element, 'preview'), element.ready]);
+    assert(seen && seen.detail.splats < SLOW_SPLATS, 'a preview before the whole');
+    await element.ready;
+    assertEqual(element.statistics?.splats, SLOW_SPLATS, 'the whole');
+  });
+
   it('a person who moves the camera in a preview keeps the place', async () => {
     const element = show({
       src: '/net/ball/red.splat?ms=4000&again',

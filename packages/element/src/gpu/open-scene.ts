@@ -178,10 +178,10 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     const onChange = (): void => scene?.onChange();
     // How much of it fits is decided when its manifest is there.
     beforeUpload(memoryBudget ?? 0);
-    const { gaussians, detail } = await openStreamed(request, lease.device, {
+    const { gaussians, detail, warnings } = await openStreamed(request, lease.device, {
       ...{ loader, signal, onProgress, memoryBudget, onChange },
     });
-    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, { detail, order: gaussians.order });
+    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, { detail, order: gaussians.order, warnings });
     return scene;
   } catch (error) {
     lease.release();

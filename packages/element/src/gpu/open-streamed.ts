@@ -26,20 +26,23 @@ const PHONE: Caps = { splats: 1e6, bytes: 160e6 };
 const DESKTOP: Caps = { splats: 3e6, bytes: 512e6 };
 /** Of the memory that all scenes of the page have left: another one may come. */
 const SHARE_OF_REST = 0.5;
+/** Parts of a scene that failed are listed up to so many. */
+const MOST_WARNINGS = 16;
 /** Pixels that what is drawn may be displaced where the caps leave room for more. */
 const DETAIL = 1;
 
 /**
- * Opens a folder by its manifest: fetches that and what is coarsest.
+ * Opens a folder by its manifest: fetches that and what is coarsest. Failures of parts are added to `warnings` later on.
  * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason
  */
 export async function openStreamed(
   request: SceneRequest,
   device: GPUDevice,
   options: StreamedOptions,
-): Promise<{ gaussians: StreamedGaussians; detail: DetailLevers }> {
+): Promise<{ gaussians: StreamedGaussians; detail: DetailLevers; warnings: readonly string[] }> {
   const { signal, memoryBudget = Infinity, onChange } = options;
   const caps = isHandheld() ? PHONE : DESKTOP;
+  const warnings: string[] = [];
   const pool: PoolOptions = {
     // As coarse as it must be beside many others, but never without a place: asked for when that is taken.
     get memoryBudget() {
@@ -48,12 +51,17 @@ export async function openStreamed(
     },
     signal,
     onChange,
-    // A page that is missing leaves what stands for it on show; the console tells whoever looks.
-    onError: (error) => console.warn(error instanceof Error ? error.message : error),
+    // A page that is missing leaves what stands for it on show. It is requested again and again, but reported once.
+    onError: (error) => {
+      const sentence = error instanceof Error ? error.message : String(error);
+      if (warnings.includes(sentence) || warnings.length === MOST_WARNINGS) return;
+      warnings.push(sentence);
+      console.warn(sentence);
+    },
   };
   const isSog = new URL(request.url).pathname.endsWith('lod-meta.json');
   const gaussians = await (isSog ? openBoxes : openPages)(request, device, options, pool);
-  if (!signal.aborted) return { gaussians, detail: { detail: DETAIL, splatBudget: caps.splats } };
+  if (!signal.aborted) return { gaussians, detail: { detail: DETAIL, splatBudget: caps.splats }, warnings };
   gaussians.destroy();
   throw signal.reason;
 }
