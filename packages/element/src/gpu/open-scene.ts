@@ -181,7 +181,11 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     const { gaussians, detail, warnings } = await openStreamed(request, lease.device, {
       ...{ loader, signal, onProgress, memoryBudget, onChange },
     });
-    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, { detail, order: gaussians.order, warnings });
+    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, {
+      detail,
+      order: gaussians.order,
+      warnings,
+    });
     return scene;
   } catch (error) {
     lease.release();
