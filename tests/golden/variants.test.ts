@@ -12,7 +12,7 @@ import {
   startVariants,
   type Variants,
 } from '@gaussian-splat/renderer';
-import { givesKnownAnswer, mortonOrder, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
+import { givesKnownAnswer, mortonOrder, packSpheres, ROUNDS, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
@@ -57,6 +57,25 @@ test('the spheres that variants are judged by are packed as files are', () => {
     );
     assert.deepEqual(packSpheres(cloud, 'float16', order), packGaussians(cloud, { sh: 'float16' }));
     assert.deepEqual(packSpheres(cloud, 'int8', order), packGaussians(cloud));
+  }
+});
+
+/** Milliseconds of the processor that a page's thread may be kept busy by one task. */
+const LONGEST_TASK_MS = 50;
+
+test('the scenes that variants are timed with are packed within one task each', () => {
+  for (const { scene } of ROUNDS) {
+    const before = process.cpuUsage();
+    const { count, geometry, sh, chunks } = scene();
+    const { user, system } = process.cpuUsage(before);
+    assert.ok((user + system) / 1000 < LONGEST_TASK_MS, `${count} splats: ${(user + system) / 1000} ms`);
+    const { length } = packGaussians(sphereCloud(4_096, 1)).geometry;
+    const copies = count / 4_096;
+    assert.equal(geometry.length, copies * length);
+    for (const words of [geometry, sh, chunks]) {
+      const part = words.length / copies;
+      assert.deepEqual(words.subarray(words.length - part), words.subarray(0, part));
+    }
   }
 });
 

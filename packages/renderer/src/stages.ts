@@ -2,6 +2,7 @@
 export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
 export { CapacityMemory, type Capacity, type LookedAt } from './capacity-memory.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
+export { ROUNDS } from './choice/search.js';
 export { ProbeDepthStage } from './depth-probe.js';
 export * from './generated/budget-shaders.js';
 export * from './generated/depth-shaders.js';

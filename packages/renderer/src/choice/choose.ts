@@ -2,6 +2,7 @@ import { loadModule } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
 import { keyFor, pageStore, readChoice, writeChoice, type AutotuneStore } from './kept-choice.js';
+import { packSpheres, sphereCloud } from './known-answer.js';
 import { ANSWER_TARGET, FrameClock, isRight, timeFrames, type Trial } from './trials.js';
 import type { RendererOptions } from '../frame-request.js';
 import { Renderer } from '../renderer.js';
@@ -42,7 +43,7 @@ const choiceOf = (device: GPUDevice): Choice => perDevice(device, 'choice', () =
 const MAP_READ = 1;
 
 /** The smallest scene of the trials. */
-const SMALL: Trial = { splats: 4_000, width: 320, height: 180 };
+const SMALL: Trial = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 'int8'), width: 320, height: 180 };
 const QUICK_MS = 8;
 
 /**

@@ -1,14 +1,18 @@
 /** The search for what a device is served best with: a second of trials, once for each adapter and origin. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { mortonOrder } from '../pack/morton.js';
+import type { PackedGaussians } from '../pack/pack.js';
 import { LIKELY, SAFE, type Variants } from '../variants.js';
+import { packSpheres, sphereCloud } from './known-answer.js';
 import { FrameClock, FRAMES, isRight, timeFrames, type Trial } from './trials.js';
 
-/** Scenes of the trials: until one candidate is left, or the time is up. */
-const ROUNDS: readonly Trial[] = [
-  { splats: 4_000, width: 320, height: 180, order: mortonOrder },
-  { splats: 64_000, width: 1920, height: 1080, order: mortonOrder },
+/** Until one candidate is left, or the time is up. */
+export const ROUNDS: readonly Trial[] = [
+  { scene: () => spheres(1), width: 320, height: 180 },
+  { scene: () => spheres(16), width: 1920, height: 1080 },
 ];
+/** Spheres of a scene: packing more of them would hold up the page. */
+const SPHERES = 4_096;
 /** Milliseconds that all rounds may take, and how much longer than the last one the next is expected to be. */
 const BUDGET = 800;
 const GROWTH = 16;
@@ -86,4 +90,25 @@ export function wrongImage({ adapterInfo }: GPUDevice): GaussianSplatError {
     found: 'another image from every variant of the renderer',
     remedy: 'update the browser and the graphics driver, and report it with this message',
   });
+}
+
+/** A scene of so many copies of the same spheres, one in the place of the other. */
+function spheres(copies: number): PackedGaussians {
+  const cloud = sphereCloud(SPHERES, Math.cbrt(400 / (copies * SPHERES)));
+  const order = mortonOrder(
+    cloud.positions,
+    Uint32Array.from({ length: SPHERES }, (_, i) => i),
+  );
+  const { geometry, sh, chunks, ...facts } = packSpheres(cloud, 'int8', order);
+  const copied = <T extends Uint32Array | Float32Array>(words: T, all: T): T => {
+    for (let k = 0; k < copies; k++) all.set(words, k * words.length);
+    return all;
+  };
+  return {
+    ...facts,
+    count: copies * SPHERES,
+    geometry: copied(geometry, new Uint32Array(copies * geometry.length)),
+    sh: copied(sh, new Uint32Array(copies * sh.length)),
+    chunks: copied(chunks, new Float32Array(copies * chunks.length)),
+  };
 }

@@ -1,21 +1,19 @@
 /** What a device is asked before it draws for anybody: whether a variant is right, and how fast. */
 import { GaussianBuffers } from '../gaussian-buffers.js';
-import type { mortonOrder } from '../pack/morton.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { QueueClock } from '../gpu/queue-clock.js';
 import { UncheckedViewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
+import type { PackedGaussians } from '../pack/pack.js';
 import type { Variants } from '../variants.js';
-import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
+import { givesKnownAnswer, probeCamera, viewpointOf } from './known-answer.js';
 
 /** Frames of a trial. */
 export const FRAMES = 4;
 
-/** A scene of spheres, and pixels of its pictures. */
+/** A scene, and pixels of its images. */
 export interface Trial {
-  readonly splats: number;
-  /** That in which files are packed; default as they come, which makes little difference where there are few. */
-  readonly order?: typeof mortonOrder;
+  readonly scene: () => PackedGaussians;
   readonly width: number;
   readonly height: number;
 }
@@ -57,14 +55,11 @@ const PAGE_TARGET = {
 export async function timeFrames(
   device: GPUDevice,
   variants: Variants,
-  { splats, width, height, order }: Trial,
+  { scene, width, height }: Trial,
   clock: FrameClock,
   target: { readonly format: GPUTextureFormat; readonly usage: number } = PAGE_TARGET,
 ): Promise<number> {
-  const size = Math.cbrt(400 / splats);
-  const cloud = sphereCloud(splats, size);
-  const all = Uint32Array.from({ length: splats }, (_, i) => i);
-  const gaussians = await GaussianBuffers.upload(device, packSpheres(cloud, 'int8', order?.(cloud.positions, all)));
+  const gaussians = await GaussianBuffers.upload(device, scene());
   const renderer = viewpointOf(device, [gaussians], variants);
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
