@@ -6,7 +6,8 @@ import { readFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { boundsOf } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { GaussianBuffers, packGaussians, packWithDetail, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { packWithDetail } from '@gaussian-splat/renderer/tools';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cameraAt, decibels, draw, meanSquare, numbers } from './views.mjs';
 

@@ -1,7 +1,8 @@
 /** Levels of detail as they are built: how many, how they nest, and that merging keeps what it must. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { packedOrder, packGaussians, packWithDetail, type PackedGaussians } from '@gaussian-splat/renderer';
+import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import { packedOrder, packWithDetail } from '@gaussian-splat/renderer/tools';
 import { buildLevels, constants, DETAIL_NUMBERS, DETAIL_PLACES } from '@gaussian-splat/renderer/stages';
 import { levelStarts } from '../support/detail-twin.js';
 import { pebbles } from '../support/scenes/pebbles.js';

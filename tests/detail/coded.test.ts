@@ -9,14 +9,8 @@ import {
   type GaussianCloud,
   type ShDegree,
 } from '@gaussian-splat/core';
-import {
-  checkManifest,
-  decodePage,
-  GaussianBuffers,
-  packGaussians,
-  Renderer,
-  StreamedGaussians,
-} from '@gaussian-splat/renderer';
+import { checkManifest, GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { decodePage } from '@gaussian-splat/renderer/tools';
 import { constants, pageLayout } from '@gaussian-splat/renderer/stages';
 import {
   buildDetailTree,

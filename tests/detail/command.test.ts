@@ -14,7 +14,8 @@ import {
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
-import { checkManifest, decodePage } from '@gaussian-splat/renderer';
+import { checkManifest } from '@gaussian-splat/renderer';
+import { decodePage } from '@gaussian-splat/renderer/tools';
 import { pageLayout } from '@gaussian-splat/renderer/stages';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';

@@ -4,15 +4,8 @@ import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
 import { GaussianSplatError, keepUsable, type Camera } from '@gaussian-splat/core';
 import { readScene, SogFiles } from '@gaussian-splat/formats';
-import {
-  GaussianBuffers,
-  levelSource,
-  packLevelPage,
-  packLevelRuns,
-  Renderer,
-  StreamedGaussians,
-  type PageSource,
-} from '@gaussian-splat/renderer';
+import { GaussianBuffers, Renderer, StreamedGaussians, type PageSource } from '@gaussian-splat/renderer';
+import { levelSource, packLevelPage, packLevelRuns } from '@gaussian-splat/renderer/tools';
 import { constants, NONE, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { onlyInLab } from '../support/extent.js';

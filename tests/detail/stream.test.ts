@@ -8,11 +8,10 @@ import {
   GaussianBuffers,
   MemoryLedger,
   packGaussians,
-  packWithDetail,
-  readPacked,
   Renderer,
   StreamedGaussians,
 } from '@gaussian-splat/renderer';
+import { packWithDetail, readPacked } from '@gaussian-splat/renderer/tools';
 import { constants, listPages, NONE, SLOT_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
 import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
 import { isLab, onlyInLab } from '../support/extent.js';

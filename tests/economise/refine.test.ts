@@ -5,9 +5,9 @@ import { boundsOf, eyeOf, GaussianSplatError, type Camera, type GaussianCloud } 
 import { dealtViewsAround, decibels, economise, meanSquare, RefiningEvaluator } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { Renderer } from '@gaussian-splat/renderer';
+import { readBack } from '@gaussian-splat/renderer/tools';
 import { CloudBuffers } from '../../packages/economise/src/gpu/cloud-buffers.js';
 import { PictureErrors } from '../../packages/economise/src/gpu/picture-errors.js';
-import { readBack } from '../../packages/economise/src/gpu/read-back.js';
 import { RefinedScene } from '../../packages/economise/src/refine/refined-scene.js';
 import { SceneFitter, USUAL_DESCENT } from '../../packages/economise/src/refine/scene-fitter.js';
 import { smallCloud } from '../formats/support/small-cloud.js';

@@ -17,7 +17,7 @@ import {
   readMotion,
   readScene,
 } from '@gaussian-splat/formats';
-import { packedOrder } from '@gaussian-splat/renderer';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { pebbles } from '../support/scenes/pebbles.js';
 
 const script = fileURLToPath(new URL('../../packages/cli/bin/gaussian-splat.mjs', import.meta.url));

@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { encodingsFor, filesOfZip, writeSog, writeStreamedSog, type SogSteps } from '@gaussian-splat/economise';
 import { readLodScene, readScene } from '@gaussian-splat/formats';
-import { packedOrder } from '@gaussian-splat/renderer';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { allocateSteps, fitSteps } from '../../packages/economise/src/steps.js';
 import { basisOf, cone, rootOf } from '../support/seen-from.js';
 import { encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';

@@ -1,7 +1,7 @@
 /** The clock of frames against a simulated page: one thread, a queue that is told late, other work on it; and what the controller makes of it. */
 import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
-import { QueueClock, type WorkTime } from '@gaussian-splat/renderer';
+import { QueueClock, type WorkTime } from '@gaussian-splat/renderer/tools';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
 import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
 import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';

@@ -4,14 +4,8 @@ import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
 import { boundsOf, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import {
-  buildPackedLevels,
-  DetailedGaussians,
-  GaussianBuffers,
-  packGaussians,
-  packWithDetail,
-  Renderer,
-} from '@gaussian-splat/renderer';
+import { DetailedGaussians, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { buildPackedLevels, packWithDetail } from '@gaussian-splat/renderer/tools';
 import { psnr } from '../support/metrics.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';

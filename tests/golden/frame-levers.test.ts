@@ -5,10 +5,10 @@ import {
   GaussianBuffers,
   packGaussians,
   Renderer,
-  SpanTimer,
   type PerFrameSettings,
   type RasterizerName,
 } from '@gaussian-splat/renderer';
+import { SpanTimer } from '@gaussian-splat/renderer/tools';
 import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';

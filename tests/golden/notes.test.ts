@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { GaussianBuffers, packedOrder, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { toCamera, worldPosition } from '../oracle/projection.js';
 import { renderOracle } from '../oracle/oracle.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';

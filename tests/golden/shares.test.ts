@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { boundsOf, keepUsable, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { joinShares, packGaussians, packShare, SHARE_SPLATS } from '@gaussian-splat/renderer';
+import { packGaussians } from '@gaussian-splat/renderer';
+import { joinShares, packShare, SHARE_SPLATS } from '@gaussian-splat/renderer/tools';
 import { seededRandom } from '../support/random.js';
 
 interface Kind {

@@ -11,12 +11,12 @@ import {
   DynamicGaussians,
   GaussianBuffers,
   packGaussians,
-  packWithDetail,
   Renderer,
   StreamedGaussians,
   type GaussianScene,
   type RendererOptions,
 } from '@gaussian-splat/renderer';
+import { packWithDetail } from '@gaussian-splat/renderer/tools';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { detailFolder } from '../support/detail-folder.js';
 import { writeTensors } from '../support/generator-tensors.js';

@@ -3,7 +3,6 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { lookAt, multiply, type Camera, type GaussianCloud, type Matrix4 } from '@gaussian-splat/core';
 import {
-  boundsOfWorld,
   capture,
   GaussianBuffers,
   packGaussians,
@@ -15,6 +14,7 @@ import {
   type HostDepth,
   type RasterizerName,
 } from '@gaussian-splat/renderer';
+import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
 import { renderOracleWorld, type PlacedCloud } from '../oracle/oracle.js';
 import { closeness } from '../support/compare.js';
 import { isLab, onlyInLab } from '../support/extent.js';

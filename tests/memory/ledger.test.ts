@@ -2,13 +2,8 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import {
-  bytesPerSplat,
-  DynamicGaussians,
-  GaussianBuffers,
-  MemoryLedger,
-  packGaussians,
-} from '@gaussian-splat/renderer';
+import { DynamicGaussians, GaussianBuffers, MemoryLedger, packGaussians } from '@gaussian-splat/renderer';
+import { bytesPerSplat } from '@gaussian-splat/renderer/tools';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { writeTensors, type TensorSpec } from '../support/generator-tensors.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';

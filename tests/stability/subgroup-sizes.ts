@@ -11,7 +11,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import fc from 'fast-check';
-import type { Threads } from '@gaussian-splat/renderer';
+import type { Threads } from '@gaussian-splat/renderer/tools';
 import { constants, SortStage } from '@gaussian-splat/renderer/stages';
 import { runCase } from '../support/gpu.js';
 import { nodeDevice } from '../support/node-device.js';

@@ -1,6 +1,7 @@
 /** Whether the levels of a streamed scene whose file has levels of its own cover each of its boxes exactly once. */
 import assert from 'node:assert/strict';
-import type { LevelScene, PageSource, StreamedGaussians } from '@gaussian-splat/renderer';
+import type { PageSource, StreamedGaussians } from '@gaussian-splat/renderer';
+import type { LevelScene } from '@gaussian-splat/renderer/tools';
 import { DETAIL_NUMBERS, DETAIL_PLACES, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { shareDrawn, type DetailView } from './detail-twin.js';
 import { readRows } from './read-rows.js';

@@ -1,16 +1,14 @@
 /** A streamed SOG scene whose folder lies in memory, and the real one of the shared data. */
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { readCoarsest, readLodScene, SogFiles } from '@gaussian-splat/formats';
+import { StreamedGaussians, type PageSource, type PoolOptions } from '@gaussian-splat/renderer';
 import {
   layOutLevels,
   levelSource,
   packLevelPage,
-  StreamedGaussians,
   type LevelPage,
   type LevelScene,
-  type PageSource,
-  type PoolOptions,
-} from '@gaussian-splat/renderer';
+} from '@gaussian-splat/renderer/tools';
 import { writeSog } from '../formats/support/sog-writer.js';
 
 /** Address of the folders: nothing is there, whoever fetches has the files. */

@@ -1,4 +1,4 @@
-import type { Threads } from '@gaussian-splat/renderer';
+import type { Threads } from '@gaussian-splat/renderer/tools';
 import { layouts, PlanStage, scanBytes } from '@gaussian-splat/renderer/stages';
 import type { Bench } from './gpu.js';
 

@@ -1,5 +1,5 @@
 /** Fetches files for a page that measures, and decodes those that are coded, as the element's worker does: reading a response costs its thread more than all else that a page of a streamed scene does. */
-import { decodePage } from '@gaussian-splat/renderer';
+import { decodePage } from '@gaussian-splat/renderer/tools';
 
 const running = new Map();
 

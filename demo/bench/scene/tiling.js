@@ -1,5 +1,6 @@
 /** Copies of a scene, as one cloud or straight to the GPU. */
-import { GaussianBuffers, packGaussians, packWithDetail } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
+import { packWithDetail } from '@gaussian-splat/renderer/tools';
 
 /** Splats in one upload: their harmonics stay well under the largest array that browsers allocate. */
 const UPLOAD = 6_500_000;

@@ -1,5 +1,5 @@
 import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import { boxPoints } from './camera/box-points.js';
 import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';

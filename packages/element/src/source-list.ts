@@ -1,5 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
-import { boundsOfWorld, World } from '@gaussian-splat/renderer';
+import { World } from '@gaussian-splat/renderer';
+import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from './camera/settings.js';
 import type { MotionHost } from './controllers/motion-controller.js';
 import type { Entrance, SceneState } from './controllers/scene-controller.js';

@@ -1,5 +1,6 @@
 import { loadModule, type Camera } from '@gaussian-splat/core';
-import type { FrameTarget, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { FrameTarget } from '@gaussian-splat/renderer';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import { Behaviours, type BehaviourHost } from './behaviours.js';

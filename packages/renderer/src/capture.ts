@@ -4,14 +4,12 @@ import type { FrameRequest } from './frame-request.js';
 import type { FrameSettings, FrameTarget } from './frame-target.js';
 import type { Renderer } from './renderer.js';
 import { requireTextureSize } from './requirements.js';
+import { untilItHasRoom } from './until-it-has-room.js';
 import type { UncheckedViewpoint } from './viewpoint.js';
 
 /** Rows of a texture copy start at multiples of this many bytes. */
 const ROW_ALIGNMENT = 256;
 const BYTES_PER_PIXEL = 16;
-
-/** Images drawn until one had room for everything: room grows by a quarter more than was asked for. */
-const MOST_TRIES = 4;
 
 /** What to capture: a camera, what is behind the splats and the like, and the settings. */
 export interface CaptureRequest extends Omit<FrameTarget, 'target'> {
@@ -46,11 +44,11 @@ export async function capture(
     usage: BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination,
   });
   try {
-    for (let tries = 0; tries < MOST_TRIES; tries++) {
+    await untilItHasRoom(() => {
       if ('gaussians' in request) (viewpoint as Renderer).render({ ...request, target: texture });
       else viewpoint.draw(request.camera, { ...request, target: texture }, request.settings);
-      if (await viewpoint.isComplete()) break;
-    }
+      return viewpoint.isComplete();
+    });
     const encoder = device.createCommandEncoder({ label: 'gs.capture' });
     encoder.copyTextureToBuffer({ texture }, { buffer: staging, bytesPerRow }, [width, height]);
     device.queue.submit([encoder.finish()]);

@@ -4,6 +4,7 @@ import { probeDepth, probeSurface, probeSurfaceQuantized } from './generated/pro
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources, type ShaderDescription } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import { readBack } from './gpu/read-back.js';
 
 /** A point of the image that was drawn last. */
 export interface ProbePoint {
@@ -55,7 +56,7 @@ export class ProbeDepthStage {
   }
 }
 
-const { storage, copySource, copyDestination, mapRead } = BUFFER_USAGE;
+const { storage, copySource, copyDestination } = BUFFER_USAGE;
 const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
 
 /**
@@ -73,7 +74,6 @@ export async function probe(
     const bytes = points.length * layouts.ProbeAnswer.size;
     const asked = memory.buffer('gs.probe_depth.points', words.byteLength, storage, new Uint32Array(words.buffer));
     const answers = memory.buffer('gs.probe_depth.answers', bytes, storage | copySource);
-    const staging = memory.buffer('gs.probe_depth.staging', bytes, mapRead | copyDestination);
     const { plan, splats, order } = source.bindings.scratch;
     // The list of survivors, which the surfaces need, takes the place of the order for a moment.
     const kept = memory.buffer('gs.probe_depth.order', order[0].size, copySource | copyDestination);
@@ -88,10 +88,9 @@ export async function probe(
     recordSurfaces(device, surfaces, source.bindings, { points: asked, answers, count: points.length });
     surfaces.end();
     encoder.copyBufferToBuffer(kept, 0, order[0], 0, kept.size);
-    encoder.copyBufferToBuffer(answers, 0, staging, 0, bytes);
     device.queue.submit([encoder.finish()]);
-    await staging.mapAsync(0x1);
-    return readAnswers(new Float32Array(staging.getMappedRange().slice(0)), points.length);
+    const [found] = await readBack(device, [{ buffer: answers }]);
+    return readAnswers(new Float32Array(found), points.length);
   } finally {
     memory.destroy();
   }

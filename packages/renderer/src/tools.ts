@@ -1,4 +1,4 @@
-/** The format of packed scenes and LOD pages, for tools that write or read them. */
+/** Packing, levels of detail, LOD pages and timers, one by one: for tools, and for packages that build on the renderer. */
 export { constants } from './generated/shaders.js';
 export { levelsAbove } from './levels/build-levels.js';
 export {
@@ -32,3 +32,28 @@ export {
   rowLengths,
   widenReach,
 } from './streaming/quantized-geometry.js';
+export { type ProbeAnswer, type ProbePoint } from './depth-probe.js';
+export { type GaussianPage, type PageRequests } from './gaussian-scene.js';
+export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
+export { SpanTimer } from './gpu/span-timer.js';
+export { buildPackedLevels, packWithDetail, type PackedLevels } from './levels/packed-levels.js';
+export { packLevelRuns } from './streaming/pack-runs.js';
+export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
+export { levelSource, packLevelPage } from './streaming/level-source.js';
+export { readPacked } from './pack/packed-scene.js';
+export { UncheckedViewpoint } from './viewpoint.js';
+export { boundsOfWorld } from './world-bounds.js';
+export { type Threads } from './stages/plan.js';
+export { bytesPerSplat, type Reservation } from './memory-ledger.js';
+export {
+  joinShares,
+  packShare,
+  SHARE_SPLATS,
+  type JoinedShares,
+  type PackedShare,
+  type ShareFacts,
+} from './pack/shares.js';
+export { readBack, readBackWith, type ReadPart } from './gpu/read-back.js';
+export { sortByKey } from './pack/radix-sort.js';
+export { RankedHeap } from './ranked-heap.js';
+export { untilItHasRoom } from './until-it-has-room.js';

@@ -8,8 +8,8 @@ import {
   type PackOptions,
   type RasterizerName,
   type RendererOptions,
-  type Threads,
 } from '@gaussian-splat/renderer';
+import type { Threads } from '@gaussian-splat/renderer/tools';
 import { renderOracle, type Mode, type OracleImage } from '../../oracle/oracle.js';
 import { closeness, type Closeness } from '../../support/compare.js';
 import { sized } from './row.js';

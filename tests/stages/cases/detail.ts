@@ -1,4 +1,5 @@
-import { packWithDetail, type PackedGaussians } from '@gaussian-splat/renderer';
+import type { PackedGaussians } from '@gaussian-splat/renderer';
+import { packWithDetail } from '@gaussian-splat/renderer/tools';
 import {
   cameraValues,
   constants,

@@ -1,5 +1,6 @@
 import { normalize, subtract, eyeOf, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { packGaussians, type PackedGaussians, type Threads } from '@gaussian-splat/renderer';
+import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import type { Threads } from '@gaussian-splat/renderer/tools';
 import {
   cameraValues,
   constants,

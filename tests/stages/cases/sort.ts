@@ -1,4 +1,4 @@
-import type { Threads } from '@gaussian-splat/renderer';
+import type { Threads } from '@gaussian-splat/renderer/tools';
 import { constants, kernelOf, layouts, sortedIn, sortScan, SortStage } from '@gaussian-splat/renderer/stages';
 import { check, checkEqual, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
 

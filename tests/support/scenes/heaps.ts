@@ -1,6 +1,6 @@
 /** Boxes with levels of detail of their own, as a streamed SOG scene has them. */
 import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
-import { layOutLevels, type LevelScene } from '@gaussian-splat/renderer';
+import { layOutLevels, type LevelScene } from '@gaussian-splat/renderer/tools';
 import { randomSource } from '../gpu.js';
 import { pick } from '../lod-folder.js';
 import { pebbles } from './pebbles.js';

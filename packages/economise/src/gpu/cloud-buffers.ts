@@ -1,5 +1,6 @@
 import { shCoefficientCount, validateCloud, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianPage } from '@gaussian-splat/renderer/tools';
 import {
   BUFFER_USAGE,
   constants,

@@ -1,9 +1,10 @@
-import type { GaussianPage, GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianPage } from '@gaussian-splat/renderer/tools';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, withMemoryCheck, writeStruct } from '@gaussian-splat/renderer/stages';
+import { readBack } from '@gaussian-splat/renderer/tools';
 import { economiseCut, GONE, SCORE_GROUP, UNJUDGED } from '../generated/shaders.js';
 import type { Cut } from '../reduce.js';
 import { layouts } from './layouts.js';
-import { readBack } from './read-back.js';
 import type { ScenePart, SceneParts } from './scene-parts.js';
 
 const DEGREES = 4;

@@ -1,6 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { Renderer } from '@gaussian-splat/renderer';
 import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
+import { readBack } from '@gaussian-splat/renderer/tools';
 import type { SeenSplats } from '../pages/seen-splats.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
@@ -14,7 +15,6 @@ import { CutScene } from './cut-scene.js';
 import { layouts } from './layouts.js';
 import { PictureErrors } from './picture-errors.js';
 import { putLowered } from './put-lowered.js';
-import { readBack } from './read-back.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
 import { seenIn } from './seen-splats.js';

@@ -1,12 +1,10 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { GaussianScene, Renderer } from '@gaussian-splat/renderer';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, TEXTURE_USAGE, writeStruct } from '@gaussian-splat/renderer/stages';
+import { untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
 import * as generated from '../generated/shaders.js';
-import { readBack } from './read-back.js';
 
 const { ERROR_TILE, pictureError, pictureErrorSum, PictureErrors: layout } = generated;
-/** Pictures drawn until all had room: room grows by a quarter more than was asked for. */
-const MOST_TRIES = 4;
 /** A sum of squares and a count of pixels. */
 const SUM_BYTES = 8;
 const COUNTS_BYTES = 16;
@@ -142,19 +140,23 @@ export class PictureErrors {
     targetOf: (exhibit: Exhibit) => GPUTexture,
     pause: Pause | undefined,
   ): Promise<ArrayBuffer> {
-    for (let tries = 1; ; tries++) {
+    let sums = new ArrayBuffer(0);
+    await untilItHasRoom(async () => {
       for (const [k, exhibit] of this.#exhibits.entries()) {
         this.#renderer.render({ gaussians, camera: exhibit.camera, target: targetOf(exhibit) });
         this.#compare(exhibit, k);
         await pause?.();
       }
       this.#addUp();
-      const [sums, counts] = await readBack(this.#device, [{ buffer: this.#errors }, { buffer: this.#counts }]);
+      const [found, counts] = await readBack(this.#device, [{ buffer: this.#errors }, { buffer: this.#counts }]);
+      sums = found;
+      // Each call remembers the room that its view lacked.
       const hadRoom = this.#exhibits.map((_, k) =>
         this.#renderer.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)),
       );
-      if (!hadRoom.includes(false) || tries === MOST_TRIES) return sums;
-    }
+      return !hadRoom.includes(false);
+    });
+    return sums;
   }
 
   #compare({ columns, rows, compare }: Exhibit, k: number): void {

@@ -1,10 +1,10 @@
 import { shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, writeStruct } from '@gaussian-splat/renderer/stages';
+import { readBackWith, type ReadPart } from '@gaussian-splat/renderer/tools';
 import { economiseTake, SCORE_GROUP } from '../generated/shaders.js';
 import { partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
 import type { ReducedCloud } from '../reduce.js';
 import { layouts } from './layouts.js';
-import { readBackWith, type ReadPart } from './read-back.js';
 import type { ScenePart, SceneParts } from './scene-parts.js';
 
 /** Splats of a part that keep the same degree, which is below the scene's. */

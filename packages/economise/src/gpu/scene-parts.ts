@@ -1,5 +1,5 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import type { GaussianPage } from '@gaussian-splat/renderer';
+import type { GaussianPage } from '@gaussian-splat/renderer/tools';
 import { BUFFER_USAGE, GpuMemory, pageCapacity, withMemoryCheck } from '@gaussian-splat/renderer/stages';
 import { CloudBuffers } from './cloud-buffers.js';
 import { layouts } from './layouts.js';

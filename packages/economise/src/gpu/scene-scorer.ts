@@ -11,10 +11,10 @@ import {
   type StructLayout,
   type StructValues,
 } from '@gaussian-splat/renderer/stages';
+import { untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
 import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
 import { MIN_LOOKS, PRIOR_VIEWS, UNSEEN_CONTRAST } from '../score.js';
 import { layouts, NO_VIEW } from './layouts.js';
-import { readBack } from './read-back.js';
 import type { SceneParts } from './scene-parts.js';
 
 /**
@@ -22,8 +22,6 @@ import type { SceneParts } from './scene-parts.js';
  * only what is tried first; what a cut costs is measured on pictures.
  */
 const USUAL_CONTRAST = 0.02;
-/** Looks at the scene, or at a view of the rehearsal, until all had room. */
-const MOST_TRIES = 4;
 /** Views that are drawn before any counts, spread over all: what a pair costs is learnt at the first, second, fourth and eighth frame. */
 const REHEARSED = 8;
 const COUNTS_BYTES = 16;
@@ -67,9 +65,7 @@ export class SceneScorer {
   /** Scores all splats, and finds their colours at lower degrees. */
   async run(signal?: AbortSignal, onScored?: (views: number, all: number) => void): Promise<void> {
     await this.#rehearse(signal);
-    for (let tries = 0; tries < MOST_TRIES; tries++) {
-      if (await this.#look(signal, onScored)) break;
-    }
+    await untilItHasRoom(() => this.#look(signal, onScored));
     this.#lower();
   }
 
@@ -85,15 +81,15 @@ export class SceneScorer {
   async #rehearse(signal: AbortSignal | undefined): Promise<void> {
     const step = Math.max(1, Math.floor(this.#views.length / REHEARSED));
     for (const camera of this.#views.filter((_, k) => k % step === 0).slice(0, REHEARSED)) {
-      for (let tries = 0; tries < MOST_TRIES; tries++) {
+      await untilItHasRoom(async () => {
         signal?.throwIfAborted();
         this.#paint(camera);
         const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.rehearse' });
         this.#renderer.copyCounts(encoder, this.#counts, 0);
         this.#device.queue.submit([encoder.finish()]);
         const [counts] = await readBack(this.#device, [{ buffer: this.#counts, byteLength: COUNTS_BYTES }]);
-        if (this.#renderer.hadRoom(new Uint32Array(counts))) break;
-      }
+        return this.#renderer.hadRoom(new Uint32Array(counts));
+      });
     }
   }
 

@@ -1,7 +1,7 @@
 import { shCoefficientCount } from '@gaussian-splat/core';
+import { readBackWith } from '@gaussian-splat/renderer/tools';
 import type { SeenSplats } from '../pages/seen-splats.js';
 import { layouts } from './layouts.js';
-import { readBackWith } from './read-back.js';
 import type { SceneParts } from './scene-parts.js';
 
 /** Share of what is seen of a splat that is imagined besides, from everywhere: no coefficient is free altogether. */

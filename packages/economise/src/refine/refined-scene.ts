@@ -1,5 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianPage } from '@gaussian-splat/renderer/tools';
 import {
   BUFFER_USAGE,
   constants,
@@ -11,9 +12,9 @@ import {
   withMemoryCheck,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
+import { readBack } from '@gaussian-splat/renderer/tools';
 import { LOGIT_AT, ROTATION_AT, SCALE_AT, SCREEN_BYTES, SCREEN_NUMBERS, SH_AT, SH_STEP } from '../generated/shaders.js';
 import { pageOf } from '../gpu/cloud-buffers.js';
-import { readBack } from '../gpu/read-back.js';
 import type { ReducedCloud } from '../reduce.js';
 
 const { CULL_GROUP, SHAPE_LOG_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;

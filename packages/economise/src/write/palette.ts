@@ -1,3 +1,5 @@
+import { RankedHeap } from '@gaussian-splat/renderer/tools';
+
 /** Groups of vectors that are alike, and which each belongs to. */
 export interface Palette {
   /** [size, width] means of the groups. */
@@ -39,16 +41,21 @@ export function findPalette(vectors: Float32Array, width: number, weights: Float
     }
     return { members, mean, error };
   };
-  const heap = new GroupHeap();
-  heap.push(groupOf(Uint32Array.from({ length: count }, (_, i) => i)));
+  const found: Group[] = [];
+  const heap = new RankedHeap(size + 1);
+  const push = (members: Uint32Array): void => {
+    const group = groupOf(members);
+    heap.push(found.push(group) - 1, group.error);
+  };
+  push(Uint32Array.from({ length: count }, (_, i) => i));
   const done: Group[] = [];
   while (heap.size + done.length < size && heap.size > 0) {
-    const group = heap.pop();
+    const group = found[heap.pop()];
     const parts = group.error > 0 ? cut(group, vectors, width, weights) : undefined;
     if (parts === undefined) done.push(group);
-    else parts.forEach((members) => heap.push(groupOf(members)));
+    else parts.forEach(push);
   }
-  const groups = [...heap.all, ...done];
+  const groups = [...Array.from(heap.items, (k) => found[k]), ...done];
   const labels = new Uint32Array(count);
   const entries = new Float32Array(width * groups.length);
   groups.forEach(({ members, mean }, label) => {
@@ -85,41 +92,4 @@ function cut(
   const first = members.filter((_, k) => isFirst[k] === 1);
   if (first.length === 0 || first.length === members.length) return undefined;
   return [first, members.filter((_, k) => isFirst[k] === 0)];
-}
-
-/** The group with the largest error first. */
-class GroupHeap {
-  readonly all: Group[] = [];
-
-  get size(): number {
-    return this.all.length;
-  }
-
-  push(group: Group): void {
-    const { all } = this;
-    let at = all.push(group) - 1;
-    while (at > 0) {
-      const above = (at - 1) >> 1;
-      if (all[above].error >= all[at].error) return;
-      [all[above], all[at]] = [all[at], all[above]];
-      at = above;
-    }
-  }
-
-  pop(): Group {
-    const { all } = this;
-    const top = all[0];
-    const last = all.pop()!;
-    if (all.length === 0) return top;
-    all[0] = last;
-    for (let at = 0; ;) {
-      let largest = at;
-      for (const below of [2 * at + 1, 2 * at + 2]) {
-        if (below < all.length && all[below].error > all[largest].error) largest = below;
-      }
-      if (largest === at) return top;
-      [all[largest], all[at]] = [all[at], all[largest]];
-      at = largest;
-    }
-  }
 }

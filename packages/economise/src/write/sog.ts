@@ -1,6 +1,6 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
-import { packedOrder } from '@gaussian-splat/renderer';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
 import type { SeenSplats } from '../pages/seen-splats.js';
 import type { Steps } from '../steps.js';
 import { findPalette, type Palette } from './palette.js';

@@ -1,6 +1,6 @@
 import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
-import { packedOrder } from '@gaussian-splat/renderer';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { buildLevels, recentred, type SplatLevel } from '@gaussian-splat/renderer/stages';
 import { nothingToWrite, sogFiles, type SogOptions } from './sog.js';
 

@@ -1,5 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { parsePoint } from '../camera/grammar.js';
 import { toScene } from '../camera/orbit.js';

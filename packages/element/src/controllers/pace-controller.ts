@@ -1,4 +1,5 @@
-import type { PerFrameSettings, WorkTime } from '@gaussian-splat/renderer';
+import type { PerFrameSettings } from '@gaussian-splat/renderer';
+import type { WorkTime } from '@gaussian-splat/renderer/tools';
 import { targetMsOf, type FrameScheduler } from '../gpu/frame-scheduler.js';
 import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
 import { keepPace, resized } from '../pace/pace.js';

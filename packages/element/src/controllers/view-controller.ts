@@ -1,5 +1,5 @@
 import { loadModule, type Camera } from '@gaussian-splat/core';
-import type { WorkTime } from '@gaussian-splat/renderer';
+import type { WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';

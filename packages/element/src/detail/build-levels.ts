@@ -1,5 +1,6 @@
 /** Loaded only where levels of detail are asked for, or the GPU is too slow without. */
-import { DetailedGaussians, readPacked, type PackedLevels } from '@gaussian-splat/renderer';
+import { DetailedGaussians } from '@gaussian-splat/renderer';
+import { readPacked, type PackedLevels } from '@gaussian-splat/renderer/tools';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { buffersOf } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';

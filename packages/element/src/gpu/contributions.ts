@@ -1,6 +1,6 @@
 /** Loaded only when a page asks what its splats contribute. */
 import type { Camera } from '@gaussian-splat/core';
-import { UncheckedViewpoint } from '@gaussian-splat/renderer';
+import { readBackWith, UncheckedViewpoint, untilItHasRoom } from '@gaussian-splat/renderer/tools';
 import type { ReadCounts } from '../stats.js';
 import type { Viewport } from './viewport.js';
 
@@ -8,8 +8,6 @@ import type { Viewport } from './viewport.js';
 const LEAST_WEIGHT = 0.5 / 255;
 /** Splats of a chunk: noted are whole ones. */
 const CHUNK = 256;
-/** Frames until buffers have room for all. */
-const MOST_TRIES = 4;
 
 /** Counts of the last frame of a viewport, and of a view. Reads back from the GPU: for panels, not for frames. */
 export async function readCounts(viewport: Viewport, camera: Camera): Promise<ReadCounts> {
@@ -24,7 +22,7 @@ export async function readCounts(viewport: Viewport, camera: Camera): Promise<Re
  */
 async function countContributing({ device, view }: Viewport, camera: Camera): Promise<number> {
   const { world, settings, filter } = view;
-  const { STORAGE, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
+  const { STORAGE, COPY_SRC } = GPUBufferUsage;
   const size =
     4 *
     CHUNK *
@@ -38,27 +36,22 @@ async function countContributing({ device, view }: Viewport, camera: Camera): Pr
     settings: { ...settings, rasterizer: 'tiles', order: 'center' },
   });
   const contributions = device.createBuffer({ label: 'gs.contributions', size, usage: STORAGE | COPY_SRC });
-  const staging = device.createBuffer({ label: 'gs.contributions.read', size, usage: MAP_READ | COPY_DST });
   const target = device.createTexture({
     size: [camera.width, camera.height],
     format: 'rgba16float',
     usage: GPUTextureUsage.RENDER_ATTACHMENT,
   });
   try {
-    for (let tries = 0; tries < MOST_TRIES; tries++) {
+    await untilItHasRoom(() => {
       viewpoint.draw(camera, { target, filter, auxiliary: { contributions } });
-      if (await viewpoint.isComplete()) break;
-    }
-    const encoder = device.createCommandEncoder({ label: 'gs.contributions' });
-    encoder.copyBufferToBuffer(contributions, 0, staging, 0, size);
-    device.queue.submit([encoder.finish()]);
-    await staging.mapAsync(GPUMapMode.READ);
-    return new Float32Array(staging.getMappedRange()).reduce(
-      (sum, weight) => sum + (weight >= LEAST_WEIGHT ? 1 : 0),
-      0,
+      return viewpoint.isComplete();
+    });
+    const [counted] = await readBackWith(device, [{ buffer: contributions }], (weights) =>
+      new Float32Array(weights).reduce((sum, weight) => sum + (weight >= LEAST_WEIGHT ? 1 : 0), 0),
     );
+    return counted;
   } finally {
     viewpoint.destroy();
-    for (const resource of [contributions, staging, target]) resource.destroy();
+    for (const resource of [contributions, target]) resource.destroy();
   }
 }

@@ -1,4 +1,5 @@
-import { QueueClock, type FrameSettings, type GaussianScene } from '@gaussian-splat/renderer';
+import type { FrameSettings, GaussianScene } from '@gaussian-splat/renderer';
+import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Timeline } from '../live/live-model.js';
 import type { Contents, Painter, PainterEvents } from './painter.js';

@@ -1,6 +1,7 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
 import { partRequest } from '@gaussian-splat/core';
-import { levelSource, MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { Here, SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './loaded-gaussians.js';

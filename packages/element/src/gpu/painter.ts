@@ -1,15 +1,6 @@
 import type { Camera, GaussianSplatError, ShDegree, SplatFilter } from '@gaussian-splat/core';
-import type {
-  PerFrameSettings,
-  RenderSettings,
-  FrameTarget,
-  ProbeAnswer,
-  ProbePoint,
-  Quality,
-  Rgba,
-  WorkTime,
-  World,
-} from '@gaussian-splat/renderer';
+import type { PerFrameSettings, RenderSettings, FrameTarget, Quality, Rgba, World } from '@gaussian-splat/renderer';
+import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { ReadCounts } from '../stats.js';
 import type { DetailLevers, LoadedGaussians } from './loaded-gaussians.js';

@@ -1,14 +1,12 @@
 import { loadModule, type Camera, type SplatFilter } from '@gaussian-splat/core';
+import type { PerFrameSettings, FrameSettings, World } from '@gaussian-splat/renderer';
 import {
   QueueClock,
   UncheckedViewpoint,
-  type PerFrameSettings,
-  type FrameSettings,
   type ProbeAnswer,
   type ProbePoint,
   type WorkTime,
-  type World,
-} from '@gaussian-splat/renderer';
+} from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { ReadCounts } from '../stats.js';
 import type { CanvasFrame, Contents, Painter, PainterEvents, Place, Rendering, Surface } from './painter.js';

@@ -1,7 +1,8 @@
 /** Loaded by the worker for large PLYs: their rows are packed by several workers while the rest is on its way. */
 import { boundsOf } from '@gaussian-splat/core';
 import { MOST_DROPPED, splatRanges, type LoadLimits, type SplatRanges } from '@gaussian-splat/formats';
-import { joinShares, packGaussians, SHARE_SPLATS, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer';
+import { packGaussians } from '@gaussian-splat/renderer';
+import { joinShares, SHARE_SPLATS, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer/tools';
 import type { LoadListeners } from './load-scene.js';
 import { packRows, type ShareAnswer, type ShareRequest } from './pack-shares.js';
 import { PartPreviews } from './part-previews.js';

@@ -1,6 +1,7 @@
 /** Loaded by the worker when first asked for. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { buildPackedLevels, type PackedGaussians, type PackedLevels } from '@gaussian-splat/renderer';
+import type { PackedGaussians } from '@gaussian-splat/renderer';
+import { buildPackedLevels, type PackedLevels } from '@gaussian-splat/renderer/tools';
 
 /** Milliseconds after which others have their turn: scenes that are loaded meanwhile, and whoever calls it off. */
 const TURN_MS = 30;

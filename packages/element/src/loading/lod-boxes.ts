@@ -9,7 +9,7 @@ import {
   type FetchSceneOptions,
   type LodScene,
 } from '@gaussian-splat/formats';
-import { layOutLevels, packLevelPage } from '@gaussian-splat/renderer';
+import { layOutLevels, packLevelPage } from '@gaussian-splat/renderer/tools';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
 import type { BoxRequest, LoadedBoxes, ProgressListener, SceneRequest } from './protocol.js';

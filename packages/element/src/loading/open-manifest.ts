@@ -5,7 +5,7 @@ import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-scene.js';
 import type { FileRequest, ProgressListener } from './protocol.js';
 
-export { decodePage } from '@gaussian-splat/renderer';
+export { decodePage } from '@gaussian-splat/renderer/tools';
 
 /** A file takes some 50 bytes, for 5 pages; and the page's thread gets a copy of what they say. */
 const MAX_BYTES = 1 << 24;

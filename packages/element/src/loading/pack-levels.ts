@@ -1,6 +1,6 @@
 /** Loaded only for files that bring levels of detail. */
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
-import { packLevelRuns } from '@gaussian-splat/renderer';
+import { packLevelRuns } from '@gaussian-splat/renderer/tools';
 import type { LoadedScene, SceneRequest } from './protocol.js';
 
 export const packLevels = (cloud: GaussianCloud, sh: SceneRequest['sh']): LoadedScene => ({

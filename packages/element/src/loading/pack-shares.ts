@@ -1,6 +1,6 @@
 /** Loaded by workers that read and pack shares of a large PLY. */
 import { readPrefix, samplePreview } from '@gaussian-splat/formats';
-import { packShare, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer';
+import { packShare, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer/tools';
 import type { GaussianCloud, ShDegree, Vector3 } from '@gaussian-splat/core';
 import { buffersOf } from './protocol.js';
 

@@ -6,14 +6,8 @@ import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { FloorRequest } from './make-floor.js';
 import type { LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
-import type {
-  CodedFile,
-  LevelPage,
-  LevelScene,
-  PackedGaussians,
-  ShPrecision,
-  StreamedScene,
-} from '@gaussian-splat/renderer';
+import type { PackedGaussians, StreamedScene } from '@gaussian-splat/renderer';
+import type { CodedFile, LevelPage, LevelScene, ShPrecision } from '@gaussian-splat/renderer/tools';
 
 /** A file to fetch. */
 export interface FileRequest {

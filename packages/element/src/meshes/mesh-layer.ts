@@ -1,5 +1,6 @@
 import { multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
-import { SceneDepth, type FrameTarget, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
+import { SceneDepth, type FrameTarget } from '@gaussian-splat/renderer';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import {
   Camera as ThreeCamera,
   DepthTexture,

@@ -1,6 +1,7 @@
 /** Loaded when an element has meshes: three.js is behind this module. */
 import { multiply, type Matrix4 } from '@gaussian-splat/core';
-import type { FrameTarget, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { FrameTarget } from '@gaussian-splat/renderer';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import { credentialsOf } from '../attributes.js';
 import type { LoadedGaussians, MeshModel } from '../gpu/loaded-gaussians.js';
 import { limited } from '../gpu/open-scene.js';

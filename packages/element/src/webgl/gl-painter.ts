@@ -1,4 +1,4 @@
-import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer';
+import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import { isSameView, orderView, drawn as whenDrawn, type OrderView } from '@gaussian-splat/renderer/webgl';
 import type { CanvasFrame, Painter, PainterEvents, Rendering, Surface } from '../gpu/painter.js';
 import type { ReadCounts } from '../stats.js';

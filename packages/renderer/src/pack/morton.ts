@@ -2,6 +2,7 @@
  * An order in which neighbours in space are mostly neighbours: along the Z-order curve (Morton 1966), so that blocks of
  * consecutive splats are compact and can be culled as a whole.
  */
+import { sortByKey } from './radix-sort.js';
 
 /** Bits of each axis in a 32-bit code. */
 const AXIS_BITS = [11, 11, 10] as const;
@@ -24,7 +25,7 @@ export function mortonOrder(positions: Float32Array, kept: Uint32Array, samples 
   if (axes.some(isFlat)) return kept;
   const codes = new Uint32Array(kept.length);
   for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], axes);
-  return sortByCode(kept, codes);
+  return sortByKey(kept, codes);
 }
 
 /**
@@ -106,32 +107,4 @@ function spreadBits(cell: number): number {
   x = (x | (x << 8)) & 0x0700f00f;
   x = (x | (x << 4)) & 0x430c30c3;
   return (x | (x << 2)) & 0x49249249;
-}
-
-interface Coded {
-  readonly values: Uint32Array;
-  readonly codes: Uint32Array;
-}
-
-/** `values` in ascending order of their codes, equal codes in their order: radix sort, 11 bits a pass. */
-function sortByCode(values: Uint32Array, codes: Uint32Array): Uint32Array {
-  const digitBits = 11;
-  const counts = new Uint32Array(2 ** digitBits);
-  let from: Coded = { values, codes };
-  let to: Coded = { values: new Uint32Array(values.length), codes: new Uint32Array(values.length) };
-  let spare: Coded = { values: new Uint32Array(values.length), codes: new Uint32Array(values.length) };
-  for (let shift = 0; shift < 32; shift += digitBits) {
-    counts.fill(0);
-    for (const code of from.codes) counts[(code >>> shift) & (counts.length - 1)]++;
-    let sum = 0;
-    for (let digit = 0; digit < counts.length; digit++) [counts[digit], sum] = [sum, sum + counts[digit]];
-    for (let k = 0; k < values.length; k++) {
-      const place = counts[(from.codes[k] >>> shift) & (counts.length - 1)]++;
-      to.codes[place] = from.codes[k];
-      to.values[place] = from.values[k];
-    }
-    // The caller's own arrays are only read.
-    [from, to, spare] = [to, shift === 0 ? spare : from, spare];
-  }
-  return from.values;
 }

@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
-import { BUFFER_USAGE } from '../gpu/kernel.js';
+import { readBackWith } from '../gpu/read-back.js';
 import { CHUNK_NUMBERS } from './chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack.js';
 import { shWords } from './sh.js';
@@ -56,17 +56,7 @@ async function readPages(
   for (const { buffer, words } of parts) {
     if (words === 0) continue;
     check();
-    const usage = BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination;
-    const staging = device.createBuffer({ label: 'gs.packed.read', size: 4 * words, usage });
-    const encoder = device.createCommandEncoder({ label: 'gs.packed.read' });
-    encoder.copyBufferToBuffer(buffer, 0, staging, 0, 4 * words);
-    device.queue.submit([encoder.finish()]);
-    try {
-      await staging.mapAsync(0x1);
-      all.set(new Uint32Array(staging.getMappedRange()), at);
-    } finally {
-      staging.destroy();
-    }
+    await readBackWith(device, [{ buffer, byteLength: 4 * words }], (mapped) => all.set(new Uint32Array(mapped), at));
     at += words;
   }
   return all;

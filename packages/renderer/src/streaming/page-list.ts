@@ -1,8 +1,8 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { SLOT_CHUNKS, type DetailManifest, type Tree, type TreePage } from './manifest.js';
+import { NONE } from '../ranked-heap.js';
 
-/** Stands for no page. */
-export const NONE = 0xffffffff;
+export { NONE };
 
 /** The pages of a streamed scene, parents before children. */
 export interface PageList {

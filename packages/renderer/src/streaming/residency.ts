@@ -1,4 +1,4 @@
-import { PageHeap } from './page-heap.js';
+import { RankedHeap } from '../ranked-heap.js';
 import { largerThan, NONE, type PageList } from './page-list.js';
 import { PageSlots, type Settled } from './page-slots.js';
 
@@ -28,9 +28,9 @@ export class Residency {
   /** [P] 1 for those that have no room beside all that is above them. */
   readonly #isTooLarge: Uint8Array;
   readonly #coming = new Set<number>();
-  readonly #missing: PageHeap;
+  readonly #missing: RankedHeap;
   /** Pages that may leave, those that can best be spared first. */
-  readonly #leavers: PageHeap;
+  readonly #leavers: RankedHeap;
   /** [P] 1 for those that are among the leavers or set aside. */
   readonly #isListed: Uint8Array;
   /** Pages that will leave for those on their way that find no empty slot, in the order in which they will; drawn until then. */
@@ -52,8 +52,8 @@ export class Residency {
     this.#below = new Uint32Array(list.count);
     this.#isTooLarge = largerThan(slots, list);
     this.#isListed = new Uint8Array(list.count);
-    this.#missing = new PageHeap(list.count);
-    this.#leavers = new PageHeap(slots);
+    this.#missing = new RankedHeap(list.count);
+    this.#leavers = new RankedHeap(slots);
   }
 
   /** [S] page in each slot, or {@link NONE}. */

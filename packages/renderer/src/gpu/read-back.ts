@@ -1,4 +1,4 @@
-import { BUFFER_USAGE } from '@gaussian-splat/renderer/stages';
+import { BUFFER_USAGE } from './kernel.js';
 
 /** A part of a buffer to read. */
 export interface ReadPart {
@@ -23,10 +23,10 @@ export async function readBackWith<Taken>(
   take: (mapped: ArrayBuffer) => Taken,
 ): Promise<Taken[]> {
   const { mapRead, copyDestination } = BUFFER_USAGE;
-  const encoder = device.createCommandEncoder({ label: 'gs.economise.read' });
+  const encoder = device.createCommandEncoder({ label: 'gs.read_back' });
   const staged = parts.map(({ buffer, byteOffset = 0, byteLength = buffer.size }) => {
     const staging = device.createBuffer({
-      label: 'gs.economise.read',
+      label: 'gs.read_back',
       size: byteLength,
       usage: mapRead | copyDestination,
     });

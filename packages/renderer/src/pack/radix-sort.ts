@@ -1,0 +1,33 @@
+const DIGIT_BITS = 11;
+const DIGITS = 1 << DIGIT_BITS;
+
+interface Items {
+  readonly values: Uint32Array;
+  readonly keys: Uint32Array;
+}
+
+const itemsOf = (count: number): Items => ({ values: new Uint32Array(count), keys: new Uint32Array(count) });
+
+/** Returns values in ascending order of their keys, equal keys in their order: radix sort, 11 bits a pass. Its arguments stay as they are. */
+export function sortByKey(values: Uint32Array, keys: Uint32Array): Uint32Array {
+  let from: Items = { values, keys };
+  let to = itemsOf(values.length);
+  let other = itemsOf(values.length);
+  for (let shift = 0; shift < 32; shift += DIGIT_BITS) {
+    moveByDigit(from, to, shift);
+    [from, to, other] = [to, other, to];
+  }
+  return from.values;
+}
+
+/** Puts items in the order of a digit, and of equal digits in the order that they had. */
+function moveByDigit({ values, keys }: Items, to: Items, shift: number): void {
+  const starts = new Uint32Array(DIGITS + 1);
+  for (const key of keys) starts[((key >>> shift) & (DIGITS - 1)) + 1]++;
+  for (let digit = 0; digit < DIGITS; digit++) starts[digit + 1] += starts[digit];
+  for (let k = 0; k < keys.length; k++) {
+    const place = starts[(keys[k] >>> shift) & (DIGITS - 1)]++;
+    to.keys[place] = keys[k];
+    to.values[place] = values[k];
+  }
+}
