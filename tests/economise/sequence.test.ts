@@ -51,7 +51,7 @@ manifest('mixed.json', { frames: ['f0.ply', 'other.ply'] });
 function command(...args: string[]): { status: number | null; said: string } {
   const env = { ...process.env, INIT_CWD: folder };
   const found = spawnSync(process.execPath, [script, 'sequence', ...args], { encoding: 'utf8', env });
-  return { status: found.status, said: found.stdout + found.stderr };
+  return { status: found.status, said: found.stderr + found.stdout };
 }
 
 test('what it cannot do is said before the work', () => {

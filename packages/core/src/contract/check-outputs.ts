@@ -6,14 +6,9 @@ import { halfToNumber } from '../half.js';
 import { attributeSlices, type AttributeSlice } from './layout.js';
 import { tensorNames } from './parse-contract.js';
 import { bareDims, describeShapes, outputRule, type TensorRule } from './tensor-rules.js';
+import type { OutputTensor } from './instances.js';
 
-/** What a run wrote to one output. */
-export interface OutputTensor {
-  readonly dtype: string;
-  readonly dims: readonly number[];
-  /** Numbers in row-major order; float16 as bits in a `Uint16Array`, or as a `Float16Array` where there is one. */
-  readonly data: ArrayLike<number>;
-}
+export type { OutputTensor };
 
 /** What {@link checkOutputs} found. */
 export interface OutputReport {

@@ -2,7 +2,14 @@ import type { OnnxDim, OnnxHeader, OnnxTensor } from '../onnx/header.js';
 import type { ContractFault } from './contract-error.js';
 import type { Contract } from './contract.js';
 import { tensorNames } from './parse-contract.js';
-import type { OutputTensor } from './check-outputs.js';
+
+/** What a run wrote to one output. */
+export interface OutputTensor {
+  readonly dtype: string;
+  readonly dims: readonly number[];
+  /** Numbers in row-major order; float16 as bits in a `Uint16Array`, or as a `Float16Array` where there is one. */
+  readonly data: ArrayLike<number>;
+}
 
 /** Inputs that come from another model or are a picture: all instances of a run share them. */
 const SHARED_ROLES: readonly string[] = ['gaussians', 'image', 'state'];

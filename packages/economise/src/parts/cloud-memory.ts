@@ -1,5 +1,13 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import type { TaskPool } from './task-pool.js';
+
+/** Allocates memory that tasks share with the thread that asks for them. */
+export type Allocator = { allocate(byteLength: number): ArrayBufferLike };
+
+/** Splats `first` to `end`, the latter not included. */
+export interface Part {
+  readonly first: number;
+  readonly end: number;
+}
 
 /** The columns of a cloud. */
 export type Columns = Pick<GaussianCloud, 'positions' | 'scales' | 'rotations' | 'opacities' | 'sh' | 'shDegree'>;
@@ -22,7 +30,7 @@ const widthsOf = (degree: ShDegree) =>
  * Columns of zeros in memory that tasks share.
  * @throws GaussianSplatError `out-of-memory/allocation`
  */
-export function allocateColumns(count: number, shDegree: ShDegree, pool: Pick<TaskPool, 'allocate'>): Columns {
+export function allocateColumns(count: number, shDegree: ShDegree, pool: Allocator): Columns {
   const widths = widthsOf(shDegree);
   const column = (name: keyof typeof widths): Float32Array =>
     new Float32Array(pool.allocate(4 * widths[name] * count), 0, widths[name] * count);

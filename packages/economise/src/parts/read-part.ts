@@ -1,7 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { readSplats } from '@gaussian-splat/formats';
-import { putCloud, type Columns } from './cloud-memory.js';
-import type { Part } from './task-pool.js';
+import { putCloud, type Columns, type Part } from './cloud-memory.js';
 
 /** So many splats are read at once: few enough for their numbers to be in the cache still when they are put in their places. */
 const BLOCK = 1 << 14;

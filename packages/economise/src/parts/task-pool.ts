@@ -1,4 +1,7 @@
+import type { Part } from './cloud-memory.js';
 import { tasks } from './tasks.js';
+
+export type { Part };
 
 /** The tasks of this package, by their names: functions of plain data and typed arrays, which another thread can call. */
 export type Tasks = typeof tasks;
@@ -36,12 +39,6 @@ export const inline: TaskPool = {
 
 /** Parts of {@link TaskPool.leastSplats} that are a part of their own at least. */
 const LEAST_SHARE = 1 / 8;
-
-/** Splats `first` to `end`, the latter not included. */
-export interface Part {
-  readonly first: number;
-  readonly end: number;
-}
 
 /** So many splats in parts of one size, but for the last. None if there are no splats. */
 export function partsOf(count: number, { size, leastSplats }: TaskPool): Part[] {
