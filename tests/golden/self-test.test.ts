@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
-import type { RasterizerName, Threads } from '@gaussian-splat/renderer';
+import type { RasterizerName } from '@gaussian-splat/renderer';
+import type { Threads } from '@gaussian-splat/renderer/tools';
 import { isLab } from '../support/extent.js';
 import { miscompiling, type Miscompilation } from '../support/miscompilation.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';

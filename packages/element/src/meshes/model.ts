@@ -1,5 +1,5 @@
 import { GaussianSplatError, type Bounds, type Vector3 } from '@gaussian-splat/core';
-import type { Reservation } from '@gaussian-splat/renderer';
+import type { Reservation } from '@gaussian-splat/renderer/tools';
 import type { LoadedMesh } from '../loading/protocol.js';
 import { unpackedViews } from './unpack.js';
 import {
