@@ -29,7 +29,11 @@ takeFiles(document.documentElement, (file) => {
 
 hero.addEventListener('load', () => {
   if (!status.textContent.startsWith('Loading')) return;
-  const { splats, dropped, bytes } = hero.statistics;
+  const {
+    splats,
+    dropped,
+    bytes: { scene: bytes },
+  } = hero.stats;
   const left = dropped > 0 ? `, ${dropped.toLocaleString()} unusable splats left out` : '';
   status.textContent = `${splats.toLocaleString()} splats${left}, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
 });

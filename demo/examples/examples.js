@@ -60,7 +60,7 @@ async function conductPictures(card) {
     const folder = new URL(chosen.dataset.pair, folderOf(card.dataset.example));
     const view = await (await fetch(new URL('view.json', folder))).json();
     const addresses = Object.entries(view.pictures).map(([name, file]) => [name, new URL(file, folder).href]);
-    element.controls = { ...Object.fromEntries(addresses), ...view.controls };
+    element.inputValues = { ...Object.fromEntries(addresses), ...view.controls };
     card.querySelectorAll('.given img').forEach((image, i) => (image.src = addresses[i][1]));
     for (const button of buttons) button.setAttribute('aria-pressed', String(button === chosen));
   };

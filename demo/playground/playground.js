@@ -232,7 +232,10 @@ function download(blob, name) {
 
 scene.addEventListener('loadstart', () => asking.abort());
 scene.addEventListener('load', () => {
-  const { splats, bytes } = scene.statistics;
+  const {
+    splats,
+    bytes: { scene: bytes },
+  } = scene.stats;
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
   for (const button of document.querySelectorAll('.result button')) button.disabled = false;
   crop.measure();

@@ -24,7 +24,9 @@ export function Harness() {
   const describe = () => {
     const element = splat.current;
     setView(
-      element ? `${element.getCameraOrbit()}, controls by reference: ${element.controls === CONTROLS}` : 'no element',
+      element
+        ? `${element.getCameraOrbit()}, controls by reference: ${element.inputValues === CONTROLS}`
+        : 'no element',
     );
   };
   return (
@@ -48,7 +50,7 @@ export function Harness() {
           alt="A scene in a React app"
           loading="eager"
           cameraControls
-          controls={CONTROLS}
+          inputValues={CONTROLS}
           style={{ width: '100%', maxWidth: 320, height: 240 }}
           onLoad={({ detail }) => {
             setStatus(`loaded ${detail.url}`);

@@ -27,7 +27,7 @@ export function fillCostCard(list, facts, element) {
   button.addEventListener('click', () => measureInto(places.frame, button, element));
   const showMemory = () => {
     button.disabled = false;
-    places.memory.textContent = `${(element.statistics.bytes / 1e6).toFixed(1)} MB for the splats`;
+    places.memory.textContent = `${(element.stats.bytes.scene / 1e6).toFixed(1)} MB for the splats`;
   };
   timeLoading(element, (ms) => {
     places.warmUp.textContent = `after ${ms < 1000 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`}, here`;

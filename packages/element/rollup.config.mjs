@@ -58,7 +58,16 @@ const sources = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
   minifyTemplateLiterals({
-    include: [path('./dist/styles.js'), path('./dist/template.js'), path('./dist/views/tour.js')],
+    include: [
+      'styles',
+      'template',
+      'hands-view',
+      'corner-button',
+      'views/tour',
+      'live/controls-panel',
+      'controllers/hotspot-controller',
+      'controllers/motion-controller',
+    ].map((name) => path(`./dist/${name}.js`)),
   }),
 ];
 const plugins = [

@@ -39,6 +39,7 @@ const TIMING = [
   'tests/element/browser/pace.test.ts',
   'tests/element/browser/picking.test.ts',
   'tests/element/browser/previews.test.ts',
+  'tests/element/browser/refused-chunks.test.ts',
   'tests/element/browser/visitors.test.ts',
   'tests/generator/browser/element.test.ts',
   'tests/generator/browser/instances.test.ts',

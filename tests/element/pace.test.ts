@@ -247,6 +247,18 @@ test('a level that costs more than the ladder says is tried again once in two mi
   );
 });
 
+test('frames that took next to nothing do not keep belief low: slow ones are answered within a second and a half', () => {
+  const rules = { targetMs: 13, levels: LEVELS };
+  let pace = INITIAL_PACE;
+  let now = 0;
+  // Past a corner of the scene, with nothing in sight.
+  for (; now < 2_000; now += 16) pace = keepPace(pace, { now, level: pace.level, milliseconds: 0.01 }, rules);
+  const begin = now;
+  for (; pace.level === 0 && now < begin + 10_000; now += 60)
+    pace = keepPace(pace, { now, level: pace.level, milliseconds: 60 }, rules);
+  assert.ok(now - begin < 1_500, `answered after ${now - begin} ms`);
+});
+
 test('frames of another level say nothing', () => {
   const pace = { ...INITIAL_PACE, level: 3 };
   assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, levels: LEVELS }), pace);

@@ -4,12 +4,11 @@ import { test } from 'node:test';
 import { PlaybackController, type PlaybackEvent } from '../../packages/element/src/controllers/playback-controller.js';
 
 /** A clock of a scene of four seconds, with the frames that it asked for and its events. */
-function clock(loops = false): { playback: PlaybackController; events: PlaybackEvent[]; frames: () => number } {
+function clock(loop = false): { playback: PlaybackController; events: PlaybackEvent[]; frames: () => number } {
   const events: PlaybackEvent[] = [];
   let frames = 0;
   const playback = new PlaybackController({
-    loops,
-    startTime: 0,
+    attributes: { loop, time: null },
     requestFrame: () => frames++,
     playbackEvent: (type) => events.push(type),
   });

@@ -10,7 +10,7 @@ interface Splat extends HTMLElement {
   readonly ready: Promise<void>;
   readonly currentTime: number;
   readonly error: { readonly reason: string } | null;
-  readonly statistics: { readonly renderer: string } | null;
+  readonly stats: { readonly renderer: string } | null;
 }
 const PATIENCE = { timeout: 100_000, polling: 100 };
 
@@ -85,7 +85,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
     );
     const reasons = await tab.evaluate(() =>
       [...document.querySelectorAll<Splat>('gaussian-splat')].map(
-        ({ error, statistics }) => error?.reason ?? statistics!.renderer,
+        ({ error, stats }) => error?.reason ?? stats!.renderer,
       ),
     );
     assert.deepEqual(reasons, ['webgl', 'unsupported/no-webgpu', 'unsupported/no-webgpu']);

@@ -9,7 +9,7 @@ import { isBuilt, openSite, root, withCompass, type OpenSite, type Visit } from 
 interface Splat extends Element {
   readonly loaded: boolean;
   readonly error: { readonly message: string } | null;
-  readonly statistics: { readonly splats: number };
+  readonly stats: { readonly splats: number };
   getCameraOrbit(): object;
   getFieldOfView(): object;
   jumpCameraToGoal(): void;

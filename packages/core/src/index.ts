@@ -4,6 +4,7 @@ export * from './errors.js';
 export * from './gaussian-cloud.js';
 export * from './half.js';
 export * from './linear.js';
+export * from './lazy.js';
 export * from './load-module.js';
 export * from './part-request.js';
 export * from './patient-fetch.js';

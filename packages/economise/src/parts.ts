@@ -1,5 +1,6 @@
 /** Work that comes in parts, for threads that do them: this entry loads no renderer. */
 export { gatherParts } from './parts/read-in-parts.js';
 export { readBlocks, type PartRead } from './parts/read-part.js';
-export { inline, type Part, type TaskInput, type TaskName, type TaskPool, type TaskResult } from './parts/task-pool.js';
+export type { Part } from './parts/cloud-memory.js';
+export { inline, type TaskInput, type TaskName, type TaskPool, type TaskResult } from './parts/task-pool.js';
 export { tasks } from './parts/tasks.js';

@@ -1,16 +1,16 @@
-import { loadModule, type Vector3 } from '@gaussian-splat/core';
+import { Lazy, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
 import { viewName, type ViewName } from './camera/spoken.js';
 import type { SpokenStrings } from './words.js';
-import { AnnouncerController, type AnnouncerHost } from './controllers/announcer-controller.js';
-import type { AutoRotateController, AutoRotateHost } from './controllers/auto-rotate-controller.js';
+import type { AnnouncerController, AnnouncerHost } from './controllers/announcer-controller.js';
+import type { AutoRotateHost } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { FlyHost } from './controllers/fly-controller.js';
 import type { InputOptions } from './controllers/input-controller.js';
-import { MotionController, type MotionHost } from './controllers/motion-controller.js';
-import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/motion-controller.js';
+import type { MotionController, MotionHost } from './controllers/motion-controller.js';
+import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/motion.js';
 import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
 
 /** What the behaviours ask of their element. */
@@ -30,27 +30,48 @@ export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
 export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, AnnouncerHost, MotionHost {
   /** Comes with what lets people move the camera. */
   prompt: PromptController | undefined;
-  readonly announcer: AnnouncerController;
-  readonly motion: MotionController;
   readonly #host: BehaviourHost;
   readonly #element: ReactiveControllerHost;
   readonly #movers: Mover[] = [];
-  #autoRotate: AutoRotateController | undefined;
-  #turning: Promise<void> | undefined;
-  #isFlyLoaded = false;
+
+  // Few pages need these.
+
+  /** What speaks of the view. */
+  readonly announcer: Lazy<AnnouncerController>;
+  /** The visitor's switch for what moves by itself. */
+  readonly motion: Lazy<MotionController>;
+  readonly #autoRotate = new Lazy('the code that turns the camera', async () => {
+    const { AutoRotateController } = await import('./controllers/auto-rotate-controller.js');
+    return this.#added(new AutoRotateController(this.#element, this));
+  });
+  readonly #fly = new Lazy('the code that flies by keyboard', async () => {
+    const { FlyController } = await import('./controllers/fly-controller.js');
+    return this.#added(new FlyController(this.#element, this));
+  });
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviourHost) {
     this.#host = host;
     this.#element = element;
-    this.motion = new MotionController(element, this);
-    this.announcer = new AnnouncerController(element, this);
+    this.motion = new Lazy(
+      'the code of the switch for motion',
+      async () => {
+        const { MotionController } = await import('./controllers/motion-controller.js');
+        return new MotionController(element, this);
+      },
+      () => element.requestUpdate(),
+    );
+    this.announcer = new Lazy('the code that speaks of the view', async () => {
+      const { AnnouncerController } = await import('./controllers/input-controller.js');
+      return new AnnouncerController(element, this);
+    });
     let motion: MediaQueryList | undefined;
     const onMotion = (): void => element.requestUpdate();
     element.addController({
       hostUpdated: () => {
         this.camera.pivot = this.#flies ? 'eye' : 'target';
-        if (this.mayFly && !this.#isFlyLoaded) void this.#loadFly();
-        if (this.autoRotates) this.#loadTurning();
+        if (this.mayFly) this.#fly.want(this.#warnOf);
+        if (this.attributes.autoRotate) this.#autoRotate.want(this.#warnOf);
+        if (this.attributes.autoRotate || this.player) this.motion.want(this.#warnOf);
       },
       hostConnected: () => {
         // From the picture to the button inside counts, too.
@@ -85,10 +106,6 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.#host.player;
   }
 
-  get autoRotates(): boolean {
-    return this.#host.autoRotates;
-  }
-
   get isOnShow(): boolean {
     return this.#host.isOnShow;
   }
@@ -104,8 +121,8 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   }
 
   get mayTurn(): boolean {
-    const mayMove = this.isOnShow && !prefersReducedMotion() && !this.motion.isHeld;
-    return this.autoRotates && mayMove && !hasKeyboard(this.surface);
+    const mayMove = this.isOnShow && !prefersReducedMotion() && !this.motion.value?.isHeld;
+    return this.attributes.autoRotate && mayMove && !hasKeyboard(this.surface);
   }
 
   get mayPrompt(): boolean {
@@ -121,7 +138,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   }
 
   startTurning(): void {
-    this.#autoRotate?.start();
+    this.#autoRotate.value?.start();
   }
 
   flyBy(right: number, up: number, forward: number): void {
@@ -143,34 +160,8 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.attributes.navigation !== 'orbit';
   }
 
-  /** Few pages fly: the keys for it come later than the rest. */
-  async #loadFly(): Promise<void> {
-    this.#isFlyLoaded = true;
-    const { FlyController } = await import('./controllers/fly-controller.js');
-    this.add(new FlyController(this.#element, this));
-    this.#element.requestUpdate();
-  }
-
-  /** So do those that turn. */
-  #loadTurning(): void {
-    this.#turning ??= loadModule(
-      'the code that turns the camera',
-      () => import('./controllers/auto-rotate-controller.js'),
-    ).then(
-      ({ AutoRotateController }) => {
-        this.add((this.#autoRotate = new AutoRotateController(this.#element, this)));
-        this.#element.requestUpdate();
-      },
-      (error: Error) => {
-        this.#turning = undefined;
-        this.#host.warn(error.message);
-      },
-    );
-  }
-
   promptBy(prompt: PromptController): void {
-    this.add((this.prompt = prompt));
-    this.#element.requestUpdate();
+    this.prompt = this.#added(prompt);
   }
 
   /** Something else that moves the camera by itself. */
@@ -178,9 +169,17 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     this.#movers.push(mover);
   }
 
+  #added<T extends Mover>(mover: T): T {
+    this.add(mover);
+    this.#element.requestUpdate();
+    return mover;
+  }
+
+  readonly #warnOf = ({ message }: Error): void => this.#host.warn(message);
+
   /** What turns by itself waits once more. */
   rest(): void {
-    this.#autoRotate?.rest();
+    this.#autoRotate.value?.rest();
   }
 
   /** Moves what moves by itself on to a frame. */
@@ -197,7 +196,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     if (action.type === 'reset') camera.reset('user-interaction');
     else if (action.type === 'pan') {
       if (!this.#walks) camera.panBy(action.right, action.up);
-    } else if (this.#flies) this.#fly(action);
+    } else if (this.#flies) this.#flyWith(action);
     else if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
     else moves = camera.zoomBy(action.factor);
     // The button that brings the camera back comes and goes with this.
@@ -212,7 +211,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   }
 
   /** In flight the scene follows the pointer: a drag across the picture turns the view by the picture's own angle. */
-  #fly(action: Extract<CameraAction, { type: 'orbit' | 'zoom' }>): void {
+  #flyWith(action: Extract<CameraAction, { type: 'orbit' | 'zoom' }>): void {
     const camera = this.camera;
     if (action.type === 'zoom') {
       const ahead = -Math.log(action.factor);

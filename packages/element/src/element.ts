@@ -14,19 +14,7 @@ import type { StageHost } from './stage-host.js';
 import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
-import { readSpokenStrings, word, type SpokenStrings } from './words.js';
-
-/** Size of the scene shown. */
-export interface SceneStatistics {
-  /** Splats on the GPU. */
-  readonly splats: number;
-  /** Splats of the file that were left out because a value was not usable. */
-  readonly dropped: number;
-  /** Bytes of GPU memory that the splats take. */
-  readonly bytes: number;
-  /** What draws: WebGPU, or WebGL 2 where there is none. */
-  readonly renderer: 'webgpu' | 'webgl';
-}
+import { readSpokenStrings, type SpokenStrings } from './words.js';
 
 /** The properties that move the camera, and what each sets. */
 const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
@@ -201,22 +189,6 @@ export class GaussianSplatElement extends ViewingMethods {
     return this.stage.inputs;
   }
 
-  /** Size of the scene shown, or null. */
-  get statistics(): SceneStatistics | null {
-    const { shown } = this.stage;
-    if (shown.length === 0) return null;
-    const nothing: SceneStatistics = { splats: 0, dropped: 0, bytes: 0, renderer: shown[0].renderer };
-    return shown.reduce(
-      ({ splats, dropped, bytes, renderer }, { gaussians: { frameCount, count, droppedCount = 0, byteLength } }) => ({
-        renderer,
-        splats: splats + (frameCount ?? count),
-        dropped: dropped + droppedCount,
-        bytes: bytes + byteLength,
-      }),
-      nothing,
-    );
-  }
-
   /**
    * What is computed, drawn, seen and in memory, what frames are drawn with, and why; null where no scene is shown. Counts of the frame are those of
    * the last {@link updateStats}.
@@ -256,7 +228,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** Style sheets stay behind in the document that made them, and so does the image where that has lost its window. */
   adoptedCallback(from: Document): void {
-    if (this.shadowRoot) adoptStyles(this.shadowRoot, styles);
+    if (this.shadowRoot) adoptStyles(this.shadowRoot);
     if (from.defaultView === null) this.stage.leaveWindowless();
   }
 
@@ -271,7 +243,7 @@ export class GaussianSplatElement extends ViewingMethods {
     if (isServer || this.ownerDocument === document) return super.createRenderRoot();
     // Lit's style sheets are of the document that this code runs in: others refuse them.
     const root = this.shadowRoot ?? this.attachShadow(GaussianSplatElement.shadowRootOptions);
-    adoptStyles(root, styles);
+    adoptStyles(root);
     return root;
   }
 
@@ -299,10 +271,9 @@ export class GaussianSplatElement extends ViewingMethods {
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
-      controls: this.cameraControls,
-      keys:
-        this.stage.walk.value?.keys ??
-        word(this.#strings, this.#attributes.navigation === 'orbit' ? 'keys-orbit' : 'keys-fly'),
+      canMove: this.cameraControls && error === null,
+      navigation: this.#attributes.navigation,
+      walkKeys: this.stage.walk.value?.keys,
       poster: this.poster,
       posterLoading: this.#attributes.loading,
       showPoster: reveal.isCovered,
@@ -312,12 +283,12 @@ export class GaussianSplatElement extends ViewingMethods {
       error,
       hasPoster: this.#hasPoster,
       prompt: !prompt?.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
-      motion: motion.switch,
-      onMotion: this.#onMotion,
+      motionView: motion.value?.view,
       onReset: this.stage.offersReset ? this.#onReset : null,
       strings: this.#strings,
-      spoken: error ? this.#spokenError(error) : announcer.text,
+      spoken: error ? this.#spokenError(error) : (announcer.value?.text ?? ''),
       hotspots: labels.value?.names ?? [],
+      handsView: this.stage.handsView,
     });
   }
 
@@ -369,8 +340,6 @@ export class GaussianSplatElement extends ViewingMethods {
     this.focus({ preventScroll: true });
   };
 
-  readonly #onMotion = (): void => void this.stage.behaviours.motion.toggle();
-
   /** Lit passes over a value that is set again; where the camera goes, it counts: a bookmark works twice. */
   override requestUpdate(...request: Parameters<ReactiveElement['requestUpdate']>): void {
     const setting = CAMERA_SETTINGS.get(request[0]);
@@ -396,7 +365,7 @@ export class GaussianSplatElement extends ViewingMethods {
   #readLiveValues(): void {
     const pose = readNumbers(this.pose);
     if (pose === undefined && this.pose) this.#warn('<gaussian-splat>: pose expects numbers; the rest pose counts.');
-    this.#liveValues = { pose, ...readControls(this.attributes, this.controls, (sentence) => this.#warn(sentence)) };
+    this.#liveValues = { pose, ...readControls(this.attributes, this.inputValues, (sentence) => this.#warn(sentence)) };
   }
 
   #readStrings(): void {

@@ -39,20 +39,13 @@ export function toElementError(error: unknown): ElementError {
 export function visitorMessage({ code, reason }: ElementError, strings: SpokenStrings): string {
   const own = strings[`error-${code}`];
   if (own !== undefined) return own;
-  switch (reason) {
-    case 'unsupported/insecure-context':
-      return 'This 3D scene needs WebGPU, which browsers offer only on secure pages: open this page over https.';
-    case 'unsupported/no-webgpu':
-      return 'This 3D scene needs WebGPU, which this browser does not have: open the page in a current Chrome, Edge, Safari or Firefox.';
-    case 'unsupported/no-adapter':
-    case 'unsupported/limits':
-      return 'This 3D scene needs WebGPU, and this browser found no graphics adapter for it: switch on hardware acceleration or update the graphics driver.';
-    case 'unsupported/wrong-image':
-      return 'This 3D scene cannot be drawn correctly here: update the browser or the graphics driver.';
-    default:
-      return VISITOR_MESSAGES[code];
-  }
+  return visitorMessages[reason] ?? VISITOR_MESSAGES[code];
 }
+
+/** Those of single errors; code that makes such an error adds its own. */
+export const visitorMessages: Partial<Record<ErrorCode, string>> = {
+  'unsupported/wrong-image': 'This 3D scene cannot be drawn correctly here: update the browser or the graphics driver.',
+};
 
 const VISITOR_MESSAGES: Readonly<Record<ElementErrorCode, string>> = {
   unsupported: 'This 3D scene needs WebGPU, which is not available here.',

@@ -14,7 +14,7 @@ export type {
   VisibilityDetail,
   WalkReadyDetail,
 } from './events.js';
-export { GaussianSplatElement, type SceneStatistics } from './element.js';
+export { GaussianSplatElement } from './element.js';
 export type { SceneStats } from './stats.js';
 export type { DynamicQualityReport } from './controllers/pace-controller.js';
 export type { SettableProperties } from './media.js';

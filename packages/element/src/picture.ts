@@ -22,7 +22,7 @@ const LOST = 'The GPU device was lost before the image was drawn: take it again 
 export async function takePicture(host: PictureHost, options: ImageOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
   const { painter } = host.view;
-  const pixels = painter && sizeOf(options, host.canvas, painter.device.limits.maxTextureDimension2D);
+  const pixels = painter && sizeOf(options, host.canvas, painter.place.limits.maxTextureDimension2D);
   const drawn = host.drawNow(pixels ?? undefined, background === undefined ? undefined : rgbaOf(background));
   if (drawn === null) throw nothingToDraw();
   const blob = new Promise<Blob | null>((resolve) =>

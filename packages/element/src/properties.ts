@@ -12,14 +12,14 @@ type ElementEvents = GaussianSplatEventMap & Omit<HTMLElementEventMap, keyof Gau
 export class SplatProperties extends LitElement {
   static override properties: PropertyDeclarations = {
     ...declarations(),
-    controls: { attribute: false },
+    inputValues: { attribute: false },
     // Accessors of MediaProperties: named here so that what a page sets before the element is defined reaches them.
     currentTime: { attribute: false, noAccessor: true },
     playbackRate: { attribute: false, noAccessor: true },
   };
 
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
-  declare controls: ControlValues | null;
+  declare inputValues: ControlValues | null;
 
   static {
     // The element draws, and so learns what its template shows, after an update. Lit's development build warns of that.

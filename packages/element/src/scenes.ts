@@ -15,7 +15,7 @@ export { SplatSceneElement } from './composition/splat-scene.js';
 
 /** The properties of `<splat-scene>` that a page may set. */
 export type SettableSceneProperties = SettableOf<typeof SCENE_ATTRIBUTES> &
-  Partial<Pick<SplatSceneElement, 'controls'>>;
+  Partial<Pick<SplatSceneElement, 'inputValues'>>;
 /** The properties of `<splat-mesh>` that a page may set. */
 export type SettableMeshProperties = SettableOf<typeof MESH_ATTRIBUTES>;
 

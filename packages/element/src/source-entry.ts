@@ -1,33 +1,65 @@
-import type { Camera } from '@gaussian-splat/core';
+import { Lazy, type Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
-import { DetailController, type DetailHost } from './controllers/detail-controller.js';
+import type { DetailHost } from './controllers/detail-controller.js';
 import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
 import { SceneController, type Entrance, type SceneHost, type SceneState } from './controllers/scene-controller.js';
 import { SourceController, type SourceHost } from './controllers/source-controller.js';
 import type { ElementError } from './errors.js';
 import type { GaussianSplatEventMap } from './events.js';
+import type { ViewerFrame } from './camera/orbit.js';
+import type { SceneBounds } from './camera/settings.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import type { GeneratorInput } from './live/inputs.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import type { ProgressListener } from './loading/protocol.js';
 import type { Member } from './member.js';
 import type { Services, Source } from './stage-host.js';
-import type { Stage } from './stage.js';
 import { costOf, type PartStats } from './stats.js';
 
-/** What a entry needs once it belongs to nothing any more. */
+/** What an entry needs once it belongs to nothing any more. */
 const NO_SERVICES = { releaseDelay: 0 } as Services;
 
-/** Whose source a entry shows: the element itself, or a child of it. */
+/** What an entry asks of the element that it belongs to, and what it tells it. */
+export interface EntryStage {
+  readonly element: ReactiveControllerHost & HTMLElement;
+  readonly attributes: Attributes;
+  readonly services: Services;
+  readonly camera: { frame(bounds: SceneBounds): void };
+  /** The camera before the image has a size. */
+  readonly firstView: Camera;
+  /** Rotation from the world to viewer space. */
+  readonly frame: ViewerFrame;
+  readonly wantsPreviews: boolean;
+  /** Somebody would see the scene. */
+  readonly isInSight: boolean;
+  /** What moves by itself may. */
+  readonly mayMove: boolean;
+  readonly memoryBudget: number | undefined;
+  /** What the page may set of the models on show. */
+  readonly inputs: readonly GeneratorInput[];
+  readonly sources: EntryList;
+  requestFrame(): void;
+  splatsChanged(): void;
+}
+
+/** The list that it is in. */
+export interface EntryList {
+  readonly own: SourceEntry;
+  readonly shown: readonly LoadedGaussians[];
+  add(entry: SourceEntry): void;
+  remove(entry: SourceEntry): void;
+  show(entry: SourceEntry, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void>;
+  left(clear: boolean): void;
+  settledOne(): void;
+  contextChanged(type: 'contextlost' | 'contextrestored', entry: SourceEntry): void;
+}
+
+/** Whose source an entry shows: the element itself, or a child of it. */
 export interface SourceOwner {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly source: Source;
   readonly liveValues: LiveHost['liveValues'];
-  readonly autoplay: boolean;
-  readonly loop: boolean;
-  /** Seconds at which it begins. */
-  readonly startTime: number;
   /** False where it moves by the clock of the element around it. */
   readonly hasOwnClock: boolean;
   /** What it says otherwise than the element. */
@@ -35,9 +67,9 @@ export interface SourceOwner {
   /** Opens what is no scene of splats. */
   readonly open?: SceneHost['open'];
   /** Puts it where it stands; absent where that is the world itself. */
-  place?(member: Member, stage: Stage): void;
+  place?(member: Member, stage: EntryStage): void;
   /** A camera of the world, as it sees it. */
-  seenFrom?(camera: Camera, member: Member | undefined, stage: Stage): Camera;
+  seenFrom?(camera: Camera, member: Member | undefined, stage: EntryStage): Camera;
   warn(sentence: string): void;
 }
 
@@ -48,9 +80,17 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   readonly ownClock: PlaybackController;
   readonly live: LiveWiring;
   readonly #source: SourceController;
-  readonly #detail: DetailController;
+  /** Few scenes need it: those with the attribute `detail`, and those that cannot be drawn whole in motion. */
+  readonly #detail = new Lazy(
+    'the code of levels of detail',
+    async () => {
+      const { DetailController } = await import('./controllers/detail-controller.js');
+      return new DetailController(this);
+    },
+    () => this.#updateDetail(),
+  );
   /** Of the element that it belongs to, or belonged to last. */
-  #stage: Stage | undefined;
+  #stage: EntryStage | undefined;
   #isIn = false;
   /** What it has in the world. */
   member: Member | undefined;
@@ -61,7 +101,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   /** Bytes that have arrived, and how many there are. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
-  constructor(owner: SourceOwner, stage?: Stage) {
+  constructor(owner: SourceOwner, stage?: EntryStage) {
     this.owner = owner;
     this.#stage = stage;
     this.#isIn = stage !== undefined;
@@ -69,7 +109,6 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.live = new LiveWiring(this);
     this.scene = new SceneController(owner.element, this);
     this.#source = new SourceController(this);
-    this.#detail = new DetailController(this);
   }
 
   // What the stage asks.
@@ -97,6 +136,11 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return this.member !== undefined && (this.state === 'ready' || this.scene.isPreview);
   }
 
+  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  get settled(): Promise<unknown> {
+    return this.scene.settled.then(() => this.#detail.settled);
+  }
+
   get inputs(): readonly GeneratorInput[] {
     return this.member?.scene.live?.inputs ?? [];
   }
@@ -107,7 +151,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   }
 
   /** It belongs to this element from now on, or to none, and comes with what it has loaded. */
-  attach(stage: Stage | null): void {
+  attach(stage: EntryStage | null): void {
     if (this.#isIn && stage === this.#stage) return this.update();
     if (this.#isIn) this.#stage!.sources.remove(this);
     this.#isIn = stage !== null;
@@ -128,15 +172,16 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   update(): void {
     if (!this.#isIn) return;
     this.#source.set(this.owner.source);
-    this.#detail.update(this.state === 'ready' ? this.scene.scene : null);
-    this.autoplay();
+    if (this.attributes.detail !== 'auto') this.#detail.want(this.#warnOf);
+    this.#updateDetail();
+    this.startPlaying();
   }
 
   /** It may be loaded, and play, now. */
   request(): void {
     if (!this.#isIn) return;
     this.#source.request();
-    this.autoplay();
+    this.startPlaying();
   }
 
   /** Loads it although nobody may see it, until another is wanted. */
@@ -159,9 +204,14 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return this.#source.postprocess;
   }
 
+  /** The clock of what plays by itself. */
+  get player(): PlaybackController | undefined {
+    return this.#stage && this.attributes.autoplay ? this.ownClock : undefined;
+  }
+
   /** Starts what plays by itself, where it may. */
-  autoplay(): void {
-    if (this.owner.autoplay && !this.hasBegun && this.ownClock.canPlay && this.#stage?.mayMove) this.ownClock.play();
+  startPlaying(): void {
+    if (!this.hasBegun && this.#stage?.mayMove && this.player?.canPlay) this.ownClock.play();
   }
 
   /** Puts it where it stands, before a frame. */
@@ -176,7 +226,8 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   }
 
   notePace(isWhole: boolean): void {
-    this.#detail.notePace(isWhole);
+    if (!isWhole) this.#detail.want(this.#warnOf);
+    this.#detail.value?.notePace(isWhole);
   }
 
   // What the controllers ask.
@@ -214,14 +265,6 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return this.owner.open;
   }
 
-  get loops(): boolean {
-    return this.owner.hasOwnClock ? this.owner.loop : this.#stage!.loop;
-  }
-
-  get startTime(): number {
-    return this.owner.startTime;
-  }
-
   get shown(): readonly LoadedGaussians[] {
     return this.#isOwn ? this.#stage!.sources.shown : [];
   }
@@ -237,7 +280,8 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
       runtimeLocation: this.services.runtimeLocation,
       loader: this.services.sceneLoader,
       state: () => this.live.state,
-      ownsControls: () => !stage.live.post.isWanted,
+      loops: () => this.playback.loops,
+      ownsControls: () => !stage.sources.own.live.hasPost,
       camera: (bounds) => {
         if (bounds && this.#isOwn) stage.camera.frame(bounds);
         return this.#seenFrom(stage.firstView);
@@ -352,6 +396,12 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   get #isOwn(): boolean {
     return this.#stage?.sources.own === this;
   }
+
+  #updateDetail(): void {
+    this.#detail.value?.update(this.#isIn && this.state === 'ready' ? this.scene.scene : null);
+  }
+
+  readonly #warnOf = ({ message }: Error): void => this.warn(message);
 
   #seenFrom(camera: Camera): Camera {
     return this.owner.seenFrom?.(camera, this.member, this.#stage!) ?? camera;

@@ -1,29 +1,44 @@
-import type { Camera } from '@gaussian-splat/core';
+import { Lazy, type Camera } from '@gaussian-splat/core';
 import { World } from '@gaussian-splat/renderer';
 import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from './camera/settings.js';
 import type { MotionHost } from './controllers/motion-controller.js';
 import type { Entrance, SceneState } from './controllers/scene-controller.js';
 import type { ElementError } from './errors.js';
-import type { DetailLevers, LoadedGaussians } from './gpu/loaded-gaussians.js';
-import { Lazy } from './lazy.js';
+import type { ViewerFrame } from './camera/orbit.js';
+import type { CameraController } from './controllers/camera-controller.js';
+import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
+import type { DetailLevers, Drawable } from './gpu/painter.js';
 import { Member } from './member.js';
-import type { SourceEntry } from './source-entry.js';
-import type { Stage } from './stage.js';
+import type { EntryList, SourceEntry } from './source-entry.js';
 
 /** States from the one that says most of several entries on. */
 const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
 
+/** What the list asks of its element, and what it tells it. */
+export interface ListStage {
+  readonly camera: Pick<CameraController, 'frame' | 'refine'>;
+  readonly frame: ViewerFrame;
+  requestFrame(): void;
+  splatsChanged(): void;
+  /** Draws what is in the world from now on. Fulfils with the first frame of it. */
+  draw(scene: Drawable): Promise<void>;
+  /** Nothing is shown any more; the last image stays unless it is to be cleared. */
+  stopDrawing(clear: boolean): void;
+  warn(sentence: string): void;
+  dispatch(event: Event): void;
+}
+
 /** All sources of an element, its own and then those of its children, and what holds for all of them together. */
-export class SourceList {
+export class SourceList implements EntryList {
   /** All that is drawn. */
   readonly world = new World();
   readonly own: SourceEntry;
   readonly meshes = new Lazy('the code that shows meshes', async () => {
     const { Meshes } = await import('./meshes/meshes.js');
-    return new Meshes(this.#stage);
+    return new Meshes(this, this.#stage);
   });
-  readonly #stage: Stage;
+  readonly #stage: ListStage;
   readonly #all: SourceEntry[];
   /** They come one after the other, so that one that fails is known. */
   #arrivals: Promise<void> | undefined;
@@ -32,7 +47,7 @@ export class SourceList {
   #isToldLoaded = false;
   readonly #lost = new Set<SourceEntry>();
 
-  constructor(stage: Stage, own: SourceEntry) {
+  constructor(stage: ListStage, own: SourceEntry) {
     this.#stage = stage;
     this.own = own;
     this.#all = [own];
@@ -68,7 +83,7 @@ export class SourceList {
   // Coming and going.
 
   /**
-   * Shows what a entry has loaded, once those before it are drawn. Fulfils when it is, or need not be any more; rejects with GaussianSplatError `out-of-memory/*`.
+   * Shows what an entry has loaded, once those before it are drawn. Fulfils when it is, or need not be any more; rejects with GaussianSplatError `out-of-memory/*`.
    * @param enter puts it into the world
    */
   show(entry: SourceEntry, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void> {
@@ -180,7 +195,7 @@ export class SourceList {
 
   /** Fulfils, and never rejects, once nothing is left to wait for. */
   get settled(): Promise<unknown> {
-    return Promise.all(this.#all.map(({ scene }) => scene.settled));
+    return Promise.all(this.#all.map(({ settled }) => settled));
   }
 
   /** Share of the loading that is done, 0..1; null while it is not known. */
@@ -225,7 +240,7 @@ export class SourceList {
 
   /** What plays by itself. */
   get player(): MotionHost['player'] {
-    const clocks = this.#all.flatMap(({ owner, ownClock }) => (owner.autoplay ? [ownClock] : []));
+    const clocks = this.#all.flatMap(({ player }) => player ?? []);
     if (clocks.length === 0) return undefined;
     const playable = clocks.filter(({ canPlay }) => canPlay);
     return {
@@ -258,8 +273,8 @@ export class SourceList {
     for (const { ownClock } of this.#all) ownClock.suspend();
   }
 
-  autoplay(): void {
-    for (const entry of this.#all) entry.autoplay();
+  startPlaying(): void {
+    for (const entry of this.#all) entry.startPlaying();
   }
 
   notePace(isWhole: boolean): void {
@@ -283,6 +298,6 @@ export class SourceList {
     const moving = followed.filter((seconds) => !Number.isNaN(seconds));
     clock.setDuration(Number.isNaN(own.duration) && moving.length > 0 ? Math.max(...moving) : own.duration);
     // What follows the clock may come when the poster has gone.
-    if (!couldPlay && clock.canPlay) own.autoplay();
+    if (!couldPlay && clock.canPlay) own.startPlaying();
   }
 }

@@ -1,4 +1,4 @@
-import { loadModule, type Camera } from '@gaussian-splat/core';
+import { Lazy, type Camera } from '@gaussian-splat/core';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import type { ReactiveControllerHost } from 'lit';
@@ -10,8 +10,8 @@ import { frameOf } from './camera/settings.js';
 import type { ScenePoint } from './camera/values.js';
 import { CameraController } from './controllers/camera-controller.js';
 import type { HotspotHost } from './controllers/hotspot-controller.js';
-import type { InputController, InputHost, InputOptions } from './controllers/input-controller.js';
-import { prefersReducedMotion } from './controllers/motion-controller.js';
+import type { InputHost, InputOptions } from './controllers/input-controller.js';
+import { prefersReducedMotion } from './controllers/motion.js';
 import type { PlaybackController } from './controllers/playback-controller.js';
 import { PrintController } from './controllers/print-controller.js';
 import { RevealController, type RevealHost } from './controllers/reveal-controller.js';
@@ -21,10 +21,9 @@ import { VisibilityController } from './controllers/visibility-controller.js';
 import type { CameraChangeSource, GaussianSplatEventMap } from './events.js';
 import { isGone } from './gpu/device-failures.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
-import type { DetailLevers, LoadedGaussians } from './gpu/loaded-gaussians.js';
+import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
-import type { Place } from './gpu/painter.js';
-import { Lazy } from './lazy.js';
+import type { DetailLevers, Drawable, ReadCounts } from './gpu/painter.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { Frame } from './live/frame-filter.js';
 import type { GeneratorInput } from './live/inputs.js';
@@ -33,7 +32,8 @@ import type { QueryHost } from './position-from-point.js';
 import { SourceEntry, type SourceOwner } from './source-entry.js';
 import { SourceList } from './source-list.js';
 import type { Services, Source, StageHost } from './stage-host.js';
-import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
+import { statsOf, type SceneStats } from './stats.js';
+import type { TemplateModel } from './template.js';
 import type { TourHost } from './views/tour.js';
 import type { SpokenStrings } from './words.js';
 
@@ -57,9 +57,11 @@ export class Stage
   readonly hasOwnClock = true;
   readonly #host: StageHost;
   readonly #visibility: VisibilityController;
-  #input: InputController | undefined;
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
+
+  /** What is in the markup has changed. */
+  readonly #update = (): void => this.element.requestUpdate();
 
   // Few pages need these.
 
@@ -67,32 +69,53 @@ export class Stage
   readonly #composition = new Lazy('the code that shows several scenes', async () => {
     const { compose } = await import('./composition/compose.js');
     compose(this);
+    return true;
   });
   /** What flies from view to view. */
-  readonly tour = new Lazy('the code for views', async () => {
-    const { Tour } = await import('./views/tour.js');
-    return new Tour(this.element, this);
-  });
+  readonly tour = new Lazy(
+    'the code for views',
+    async () => {
+      const [{ Tour }] = await Promise.all([import('./views/tour.js'), this.behaviours.announcer.get()]);
+      return new Tour(this.element, this);
+    },
+    this.#update,
+  );
   /** What walks on the floor. */
-  readonly walk = new Lazy('the code for walking', async () => {
-    const { WalkController } = await import('./walk/walk-controller.js');
-    const walk = new WalkController(this.element, this);
-    this.behaviours.add(walk);
-    return walk;
-  });
+  readonly walk = new Lazy(
+    'the code for walking',
+    async () => {
+      const { WalkController } = await import('./walk/walk-controller.js');
+      const walk = new WalkController(this.element, this);
+      this.behaviours.add(walk);
+      return walk;
+    },
+    this.#update,
+  );
   /** Labels of the page. */
-  readonly labels = new Lazy('the code of labels', async () => {
-    const { HotspotController } = await import('./controllers/hotspot-controller.js');
-    const labels = new HotspotController(this.element, this);
-    if (this.drawnFrom) labels.frameDrawn(this.drawnFrom);
-    return labels;
-  });
+  readonly labels = new Lazy(
+    'the code of labels',
+    async () => {
+      const { HotspotController } = await import('./controllers/hotspot-controller.js');
+      const labels = new HotspotController(this.element, this);
+      if (this.drawnFrom) labels.frameDrawn(this.drawnFrom);
+      return labels;
+    },
+    this.#update,
+  );
   /** What listens to mouse, touch and keys. */
-  readonly #hands = new Lazy('the code for mouse, touch and keys', async () => {
-    const { InputController, PromptController } = await import('./controllers/input-controller.js');
-    this.#input = new InputController(this.element, this);
-    this.behaviours.promptBy(new PromptController(this.element, this.behaviours));
-  });
+  readonly #hands = new Lazy(
+    'the code for mouse, touch and keys',
+    async () => {
+      const { handsView, InputController, PromptController } = await import('./controllers/input-controller.js');
+      await this.behaviours.announcer.get();
+      this.behaviours.promptBy(new PromptController(this.element, this.behaviours));
+      this.handsView = handsView;
+      return new InputController(this.element, this);
+    },
+    this.#update,
+  );
+  /** Present while there is one who listens. */
+  handsView: TemplateModel['handsView'];
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: StageHost) {
     this.element = element;
@@ -149,30 +172,9 @@ export class Stage
     return this.#host.strings;
   }
 
-  get autoplay(): boolean {
-    return this.attributes.autoplay;
-  }
-
-  get loop(): boolean {
-    return this.attributes.loop;
-  }
-
-  get startTime(): number {
-    const seconds = Number(this.attributes.time);
-    return Number.isFinite(seconds) ? seconds : 0;
-  }
-
   get input(): InputOptions {
     const { cameraControls: enabled, disableZoom, disablePan, disableTap, touchAction, zoom: wheel } = this.attributes;
     return { enabled, zoom: !disableZoom, pan: !disablePan, tap: !disableTap, touchAction, wheel };
-  }
-
-  get autoRotates(): boolean {
-    return this.attributes.autoRotate;
-  }
-
-  get views(): TourHost['views'] {
-    return this.attributes.views;
   }
 
   get decayMs(): number {
@@ -285,10 +287,7 @@ export class Stage
 
   /** The visible surface under a point of the page: see the element's method of this name. */
   async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
-    const { positionFromPoint } = await loadModule(
-      'the code that finds points of the scene',
-      () => import('./position-from-point.js'),
-    );
+    const { positionFromPoint } = await queries.get();
     return positionFromPoint(this, clientX, clientY);
   }
 
@@ -321,12 +320,12 @@ export class Stage
 
   /** What moves by itself may. */
   get mayMove(): boolean {
-    return this.isOnShow && !prefersReducedMotion() && !this.behaviours.motion.isHeld;
+    return this.isOnShow && !prefersReducedMotion() && !this.behaviours.motion.value?.isHeld;
   }
 
   /** Fingers have moved the camera, and have no Home key. */
   get offersReset(): boolean {
-    return this.input.enabled && this.isOnShow && this.#input?.isTouch === true && this.camera.isTouched;
+    return this.input.enabled && this.isOnShow && this.#hands.value?.isTouch === true && this.camera.isTouched;
   }
 
   get hasPicture(): boolean {
@@ -403,7 +402,7 @@ export class Stage
   }
 
   cameraChanged(source: CameraChangeSource): void {
-    this.behaviours.announcer.cameraMoved();
+    this.behaviours.announcer.value?.cameraMoved();
     this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
   }
 
@@ -423,15 +422,15 @@ export class Stage
   }
 
   /** Draws what is in the world from now on. Fulfils with the first frame of it. */
-  draw(place: Place): Promise<void> {
-    const drawn = this.view.show(place);
-    this.live.post.attach(this.view.painter);
+  draw(scene: Drawable): Promise<void> {
+    const drawn = this.view.show(scene);
+    this.live.attachPost(this.view.painter);
     return drawn;
   }
 
   /** Nothing is shown any more; the last picture stays unless it is to be cleared. */
   stopDrawing(clear: boolean): void {
-    this.live.post.attach(null);
+    this.live.attachPost(null);
     if (!clear) return this.view.pause();
     this.drawnFrom = undefined;
     this.labels.value?.forget();
@@ -441,7 +440,7 @@ export class Stage
   posterDismissed(): void {
     this.dispatch(new Event('poster-dismissed'));
     this.sources.own.hasBegun = false;
-    this.sources.autoplay();
+    this.sources.startPlaying();
   }
 
   act(action: CameraAction): boolean {
@@ -460,7 +459,7 @@ export class Stage
 
   /** The space bar, for all that moves. A player's controls around the element have keys of their own. */
   toggleMotion(): boolean {
-    if (this.behaviours.motion.toggle()) return true;
+    if (this.behaviours.motion.value?.toggle()) return true;
     if (!this.playback.canPlay || this.element.slot === 'media') return false;
     if (this.playback.paused) this.playback.play();
     else this.playback.pause();
@@ -472,23 +471,19 @@ export class Stage
   /** Children bring what they need: few pages have any. */
   #lookAtChildren(): void {
     const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
-    if (has('splat-scene,splat-mesh')) this.#composition.get().catch(this.#warnOf);
-    if (has('[slot^=hotspot-]')) this.#show(this.labels);
-    if (this.tour.value || has('[data-orbit]')) this.#show(this.tour);
-  }
-
-  /** What has an own part in the markup. */
-  #show(code: Lazy<unknown>): void {
-    code.get().then(() => this.element.requestUpdate(), this.#warnOf);
+    if (has('splat-scene,splat-mesh')) this.#composition.want(this.#warnOf);
+    if (has('[slot^=hotspot-]')) this.labels.want(this.#warnOf);
+    if (has('[data-orbit]')) this.tour.want(this.#warnOf);
+    if (this.tour.value) this.element.requestUpdate();
   }
 
   #updated(): void {
     this.sources.own.update();
-    this.live.post.want(this.sources.own.postprocess);
+    this.live.wantPost(this.sources.own.postprocess);
     if (!this.sources.own.isLeaving) this.playback.keepScene();
-    if (this.views && !this.tour.value) this.#show(this.tour);
-    if (this.attributes.navigation === 'walk' && !this.walk.value) this.#show(this.walk);
-    if (this.input.enabled) this.#hands.get().catch(this.#warnOf);
+    if (this.attributes.views) this.tour.want(this.#warnOf);
+    if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
+    if (this.input.enabled) this.#hands.want(this.#warnOf);
     this.reveal.settle();
     this.sources.request();
   }
@@ -507,6 +502,8 @@ export class Stage
     this.view.requestFrame();
   }
 }
+
+const queries = new Lazy('the code that finds points of the scene', () => import('./position-from-point.js'));
 
 /** Width and height, in pixels, that a generator hears of before the picture has a size: those of an element without style. */
 const FIRST_SIZE = [300, 150] as const;

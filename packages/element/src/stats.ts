@@ -4,6 +4,7 @@ import type { DynamicQualityReport } from './controllers/pace-controller.js';
 import type { SceneState } from './controllers/scene-controller.js';
 import type { ElementError } from './errors.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
+import type { ReadCounts } from './gpu/painter.js';
 
 /** What is modelled, drawn, and seen of a scene, what it takes, and why. */
 export interface SceneStats {
@@ -15,6 +16,8 @@ export interface SceneStats {
   readonly isPreview: boolean;
   /** Of these, left out because a value was not usable. */
   readonly dropped: number;
+  /** Splats on the GPU; of a sequence those of its present frame, of a streamed scene those for which there is room. */
+  readonly splats: number;
   /** Splats on the GPU, those of levels of detail included; of a streamed scene those for which there is room. */
   readonly inMemory: number;
   /**
@@ -68,15 +71,6 @@ export const costOf = (
   bytes: scene ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0) : 0,
 });
 
-/** Counts that have to be read back from the GPU. */
-export interface ReadCounts {
-  readonly drawn: number;
-  /** Visible, but without room in what the device allows a buffer to hold. */
-  readonly left: number;
-  /** null where it is not counted: with WebGL. */
-  readonly contributed: number | null;
-}
-
 /** What is known besides the scene. */
 export interface StatsContext {
   readonly quality: QualityChoice;
@@ -103,6 +97,7 @@ export function statsOf(
   return {
     renderer: scenes[0].renderer,
     isPreview,
+    splats: sum((scene) => costOf(scene).splats),
     modelled: sum(({ gaussians }) => gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
     dropped,
     inMemory: sum(({ gaussians }) => gaussians.count) + merged,

@@ -1,12 +1,21 @@
 import { css, type CSSResult } from 'lit';
 
-/** Gives a shadow tree a style sheet of its own document: those of other documents are refused there. A document without a window shows nothing, and gets none. */
-export function adoptStyles(root: ShadowRoot, { cssText }: CSSResult): void {
-  const { defaultView } = root.ownerDocument;
-  if (defaultView === null) return;
-  const sheet = new (defaultView as Window & typeof globalThis).CSSStyleSheet();
-  sheet.replaceSync(cssText);
-  root.adoptedStyleSheets = [sheet];
+const stylesOf = new WeakMap<ShadowRoot, CSSResult[]>();
+
+/**
+ * Adds styles to a shadow tree, in style sheets of its own document: those of other documents are refused there. Without any, makes those anew that it has, for
+ * a document that it has come to. A document without a window shows nothing, and gets none.
+ */
+export function adoptStyles(root: ShadowRoot, ...more: CSSResult[]): void {
+  const all = [...(stylesOf.get(root) ?? [styles]), ...more];
+  stylesOf.set(root, all);
+  const view = root.ownerDocument.defaultView as (Window & typeof globalThis) | null;
+  if (view === null) return;
+  root.adoptedStyleSheets = all.map(({ cssText }) => {
+    const sheet = new view.CSSStyleSheet();
+    sheet.replaceSync(cssText);
+    return sheet;
+  });
 }
 
 /**
@@ -83,84 +92,16 @@ export const styles = css`
   .covered canvas {
     visibility: hidden;
   }
-  .hotspot {
-    position: absolute;
-    top: 0;
-    left: 0;
-    opacity: var(--max-hotspot-opacity, 1);
-    transition: opacity 0.3s;
-  }
-  .hotspot:not(.placed) {
-    visibility: hidden;
-  }
-  .hotspot ::slotted(*) {
-    pointer-events: auto;
-  }
-  .hotspot.hidden {
-    opacity: var(--min-hotspot-opacity, 0.25);
-  }
-  .hotspot.hidden:not(.with-panel) ::slotted(*) {
-    pointer-events: none;
-  }
-  .hotspot.hidden:focus-within {
-    opacity: var(--max-hotspot-opacity, 1);
-  }
-  .prompt {
-    display: var(--interaction-prompt-display, flex);
-    align-items: end;
-    justify-content: center;
-    padding-block-end: 8px;
-  }
-  [part='prompt'],
   [part='poster-cue'] {
     padding: 10px;
     border-radius: 50%;
     line-height: 0;
     background: var(--interaction-prompt-background, rgb(0 0 0 / 0.45));
     color: var(--interaction-prompt-color, rgb(255 255 255));
-  }
-  [part='poster-cue'] {
     position: absolute;
     top: 50%;
     left: 50%;
     translate: -50% -50%;
-  }
-  .corner {
-    position: absolute;
-    inset-block-end: 8px;
-    inset-inline-end: 8px;
-    padding: 8px;
-    border: 0;
-    border-radius: 50%;
-    line-height: 0;
-    cursor: pointer;
-    background: var(--interaction-prompt-background, rgb(0 0 0 / 0.45));
-    color: var(--interaction-prompt-color, rgb(255 255 255));
-  }
-  [part='pause-button'] {
-    display: var(--pause-button-display, block);
-  }
-  [part='reset-button'] {
-    display: var(--reset-button-display, block);
-    inset-inline: 8px auto;
-  }
-  @media (hover: hover) {
-    :host(:not(:hover, :focus-within)) [part='pause-button'] {
-      opacity: 0;
-    }
-  }
-  [part='prompt'].wiggle {
-    animation: wiggle 4.5s;
-  }
-  @keyframes wiggle {
-    12.5%,
-    62.5% {
-      transform: translateX(-24px);
-    }
-    37.5%,
-    87.5% {
-      transform: translateX(24px);
-    }
   }
   .gone {
     opacity: 0;
@@ -235,12 +176,8 @@ export const styles = css`
     }
   }
   @media (prefers-reduced-motion: reduce) {
-    .poster,
-    .hotspot {
+    .poster {
       transition: none;
-    }
-    [part='prompt'] {
-      animation: none;
     }
   }
 `;

@@ -1,4 +1,4 @@
-import { html, nothing, svg, type TemplateResult } from 'lit';
+import { html, nothing, type TemplateResult } from 'lit';
 import { visitorMessage, type ElementError } from './errors.js';
 import { languageOf, word, type SpokenStrings } from './words.js';
 
@@ -6,9 +6,11 @@ import { languageOf, word, type SpokenStrings } from './words.js';
 export interface TemplateModel {
   /** Text alternative; empty for a decorative scene, null where the page gives none. */
   readonly label: string | null;
-  readonly controls: boolean;
-  /** Help for the keys of the scene. */
-  readonly keys: string;
+  /** People may move the camera. */
+  readonly canMove: boolean;
+  readonly navigation: 'orbit' | 'fly' | 'walk';
+  /** Help for the keys of walking, once a floor is looked for. */
+  readonly walkKeys: string | undefined;
   readonly poster: string | null;
   readonly posterLoading: 'lazy' | 'eager';
   readonly showPoster: boolean;
@@ -22,36 +24,33 @@ export interface TemplateModel {
   readonly hasPoster: boolean;
   /** How people learn that they can move the scene. */
   readonly prompt: 'none' | 'basic' | 'wiggle';
-  /** What the button for all that moves by itself does; `none` where nothing does. */
-  readonly motion: 'none' | 'pause' | 'play';
-  readonly onMotion: () => void;
   /** Brings the camera back; null where no button is offered for it. */
   readonly onReset: (() => void) | null;
   /** Words of the page in place of the English ones. */
   readonly strings: SpokenStrings;
   /** What screen readers are told: of an error, else of the camera. */
   readonly spoken: string;
-  /** Slot names of the hotspots. */
+  /** What people see who may move the camera, once its code is there. */
+  readonly handsView: ((model: TemplateModel) => TemplateResult) | undefined;
+  /** The button for all that moves by itself; undefined where nothing does. */
+  readonly motionView: TemplateResult | undefined;
+  /** Names of the slots of the hotspots. */
   readonly hotspots: readonly string[];
 }
 
 const PLAY_SIGN = 'M8 5v14l11-7z';
-const PAUSE_SIGN = 'M6 5h4v14H6zM14 5h4v14h-4z';
-/** Four corners around the middle. */
-const FRAME_SIGN = 'M4 9V4h5v2H6v3zM15 4h5v5h-2V6h-3zM4 15h2v3h3v2H4zM18 15h2v5h-5v-2h3zM10 10h4v4h-4z';
 
 /** The element's shadow tree. */
 export function template(model: TemplateModel): TemplateResult {
   return html`
-    ${view(model)} ${hotspots(model)} ${prompt(model)} ${cornerButtons(model)} ${poster(model)}
+    ${view(model)} ${hotspots(model)} ${model.handsView?.(model)} ${model.motionView} ${poster(model)}
     ${model.isLoading ? progressBar(model) : nothing} ${model.error ? message(model, model.error) : nothing}
     <div class="for-screen-readers" role="status" lang=${languageOf(model.strings) ?? nothing}>${model.spoken}</div>
   `;
 }
 
 /** The picture. One canvas for life, whatever the attributes: a context cannot move from one to another. */
-function view({ label, controls: isControlled, keys, onReveal, error, strings }: TemplateModel): TemplateResult {
-  const controls = isControlled && error === null;
+function view({ label, canMove: controls, onReveal, strings }: TemplateModel): TemplateResult {
   const role = controls ? 'application' : label === '' ? 'presentation' : 'img';
   // Behind a poster that waits for a person there is nothing to see or to do yet.
   const isWaiting = onReveal !== null;
@@ -68,56 +67,14 @@ function view({ label, controls: isControlled, keys, onReveal, error, strings }:
     >
       <canvas part="canvas"></canvas>
     </div>
-    ${controls ? help(keys, strings) : nothing}
   `;
 }
-
-const help = (text: string, strings: SpokenStrings): TemplateResult =>
-  html`<span id="keys" class="for-screen-readers" hidden lang=${languageOf(strings) ?? nothing}>${text}</span>`;
 
 /** A box for each name, in their order; where it lies is up to the controller of the hotspots. Under a poster nobody reaches them. */
 function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
   return html`<div id="hotspots" class="layer ${showPoster ? 'gone' : ''}">
     ${hotspots.map((name) => html`<div class="hotspot hidden"><slot name=${name}></slot></div>`)}
   </div>`;
-}
-
-/** A hand that drags. Only a picture: those who do not see it are told the keys when the scene has the focus. */
-function prompt({ prompt, strings }: TemplateModel): TemplateResult | typeof nothing {
-  if (prompt === 'none') return nothing;
-  const hand = svg`<path d="M9 11.24V7.5a2.5 2.5 0 0 1 5 0v3.74a4.5 4.5 0 1 0-5 0zm9.84 4.63-4.54-2.26a1 1 0 0 0-.54-.11H13v-6a1.5
-    1.5 0 0 0-3 0v10.74l-3.43-.72a1 1 0 0 0-1 .33l-.57.62 4.94 4.94a1.5 1.5 0 0 0 1.06.44h6.79a1.5 1.5 0 0 0 1.48-1.29l.75-5.27a1.5
-    1.5 0 0 0-.18-1.42z" />`;
-  return html`<div class="layer prompt">
-    <slot name="interaction-prompt">
-      <div
-        part="prompt"
-        class=${prompt}
-        role="img"
-        lang=${languageOf(strings) ?? nothing}
-        aria-label=${word(strings, 'interaction-prompt')}
-      >
-        <svg viewBox="0 0 24 24" width="44" height="44" aria-hidden="true" fill="currentColor">${hand}</svg>
-      </div>
-    </slot>
-  </div>`;
-}
-
-/** One that brings the camera back, and one for what moves: seen while the pointer is over the scene or the keyboard in it, and always where nothing hovers. */
-function cornerButtons({ motion, onMotion, onReset, strings }: TemplateModel): TemplateResult {
-  const button = (part: string, name: 'reset' | 'pause' | 'play', sign: string, onClick: () => void): TemplateResult =>
-    html`<button
-      type="button"
-      class="corner"
-      part=${part}
-      aria-label=${word(strings, name)}
-      lang=${languageOf(strings) ?? nothing}
-      @click=${onClick}
-    >
-      <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true" fill="currentColor"><path d=${sign} /></svg>
-    </button>`;
-  return html`${onReset ? button('reset-button', 'reset', FRAME_SIGN, onReset) : nothing}
-  ${motion === 'none' ? nothing : button('pause-button', motion, motion === 'pause' ? PAUSE_SIGN : PLAY_SIGN, onMotion)}`;
 }
 
 /**

@@ -7,18 +7,8 @@ import type { PANEL_WORDS } from './live/controls-panel.js';
 export const WORDS = {
   scene: '3D scene',
   role: '3D scene viewer',
-  'keys-orbit':
-    'Arrow keys turn the view, Page Up and Page Down or plus and minus change the distance, ' +
-    'Shift with the arrow keys moves it sideways, Home brings it back.',
-  'keys-fly':
-    'Arrow keys look around, W and S fly forward and back, A and D to the sides, E and Q up and down, with Shift faster, ' +
-    'Home brings the view back.',
-  'interaction-prompt': 'Drag to look around',
   show: 'Show …',
   loading: 'Loading the 3D scene',
-  reset: 'Bring the view back',
-  pause: 'Stop the motion',
-  play: 'Start the motion',
   details: 'Details',
 } as const;
 
@@ -28,11 +18,24 @@ export type ViewWord = 'views' | 'next-view' | 'previous-view' | 'keys-views';
 /** Words of walking, which few pages have. */
 export type WalkWord = 'keys-walk' | 'blocked';
 
+/** Words for people who may move the camera, which come with what listens to them. */
+export type HandWord = 'keys-orbit' | 'keys-fly' | 'interaction-prompt' | 'reset';
+
+/** Words of the switch for what moves by itself, likewise. */
+export type MotionWord = 'pause' | 'play';
+
 /** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
 export type SpokenStrings = Readonly<
   Partial<
     Record<
-      ViewName | keyof typeof WORDS | keyof typeof PANEL_WORDS | `error-${ElementErrorCode}` | ViewWord | WalkWord,
+      | ViewName
+      | keyof typeof WORDS
+      | keyof typeof PANEL_WORDS
+      | `error-${ElementErrorCode}`
+      | ViewWord
+      | WalkWord
+      | HandWord
+      | MotionWord,
       string
     >
   >

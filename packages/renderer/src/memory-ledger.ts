@@ -27,8 +27,8 @@ export class MemoryLedger {
   readonly spare = new Set<() => void>();
   readonly #held = new Set<Reservation>();
 
-  /** The ledger of a device; all scenes on it share one. */
-  static of(device: GPUDevice): MemoryLedger {
+  /** The ledger of a device, or of a context of WebGL; all scenes on it share one. */
+  static of(device: GPUDevice | WebGL2RenderingContext): MemoryLedger {
     const known = LEDGERS.get(device);
     if (known) return known;
     const ledger = new MemoryLedger();
@@ -78,7 +78,7 @@ export class MemoryLedger {
   }
 }
 
-const LEDGERS = new WeakMap<GPUDevice, MemoryLedger>();
+const LEDGERS = new WeakMap<object, MemoryLedger>();
 
 const inBytes = (value: number): string => `${Math.floor(value)} bytes (${(value / 1e6).toFixed(1)} MB)`;
 

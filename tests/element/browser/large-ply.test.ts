@@ -135,7 +135,7 @@ describe('a large PLY', () => {
       `preview after ${first.toFixed(0)} ms, all after ${(performance.now() - start).toFixed(0)} ms; longest task ${longest.toFixed(0)} ms`,
     );
     observer.disconnect();
-    assertEqual(element.statistics?.splats, expected.count, 'splats');
+    assertEqual(element.stats?.splats, expected.count, 'splats');
     assert(workers > 1, `shared by ${workers} workers, with the limits that every page has`);
   });
 });

@@ -192,7 +192,7 @@ describe('moves and removals', () => {
       element.remove();
       await element.updateComplete;
       await until(() => isLost, 'the last user to have destroyed the device');
-      assertEqual([element.loaded, element.statistics], [false, null], 'after the delay');
+      assertEqual([element.loaded, element.stats], [false, null], 'after the delay');
       document.body.append(element);
       await nextEvent(element, 'load');
       assert(isGreen((await screenOf(element)).at(60, 50)), 'seen again');

@@ -136,7 +136,7 @@ describe('another src', () => {
     element.src = COMPASS;
     await nextEvent(element, 'load');
     await delay(3500);
-    assert(element.loaded && element.statistics !== null, 'it is gone');
+    assert(element.loaded && element.stats !== null, 'it is gone');
     assert(element.toDataURL().startsWith('data:image/png'), 'its picture');
   });
 
@@ -163,12 +163,12 @@ describe('load()', () => {
       const seen = eventsOf(element);
       element.load();
       await element.ready;
-      assertEqual([element.loaded, element.error, element.statistics?.splats], [true, null, 1], 'after an error');
+      assertEqual([element.loaded, element.error, element.stats?.splats], [true, null, 1], 'after an error');
       await put('compass.splat');
       element.load();
       assertEqual(element.loaded, false, 'loaded meanwhile');
       await element.ready;
-      assert(element.loaded && element.statistics?.splats !== 1, 'the other file');
+      assert(element.loaded && element.stats?.splats !== 1, 'the other file');
       const loads = seen.filter((type) => type !== 'camera-change');
       assertEqual(loads, ['emptied', 'loadstart', 'load', 'emptied', 'loadstart', 'load'], 'events');
       assertEqual(signed, 3, 'addresses signed');

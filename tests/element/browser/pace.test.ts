@@ -204,7 +204,7 @@ describe('the pace of pictures', () => {
     const stats = await element.updateStats();
     assert(stats, 'stats');
     assertEqual(element.stats, stats, 'kept');
-    assertEqual(stats.modelled, element.statistics?.splats, 'modelled');
+    assertEqual(stats.modelled, element.stats?.splats, 'modelled');
     assert(stats.drawn !== null && stats.drawn > 0 && stats.drawn <= stats.inMemory, `${stats.drawn} drawn`);
     assert(
       stats.contributed !== null && stats.contributed > 0 && stats.contributed <= stats.drawn,

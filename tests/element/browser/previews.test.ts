@@ -110,7 +110,7 @@ describe('previews on show', () => {
       );
       await element.ready;
       const total = performance.now() - start;
-      assertEqual([element.loaded, element.statistics?.splats, loads], [true, 500_000, 1], 'the whole');
+      assertEqual([element.loaded, element.stats?.splats, loads], [true, 500_000, 1], 'the whole');
       assert(!element.matches(':state(preview)'), 'no preview any more');
       best = { share: first / total, longestTask: await longestTask() };
       console.log(
@@ -131,7 +131,7 @@ describe('previews on show', () => {
     assert(detail.splats < SLOW_SPLATS, `${detail.splats} splats at first`);
     assert((await screenOf(element)).middleOf(isRed) !== null, 'a picture');
     await element.ready;
-    assertEqual(element.statistics?.splats, SLOW_SPLATS, 'the whole');
+    assertEqual(element.stats?.splats, SLOW_SPLATS, 'the whole');
     const direct = await showLoaded({ src: '/net/ball/red.splat?ms=0' });
     await delay(1_000);
     const [found, expected] = [element, direct].map((each) => `${each.getCameraOrbit()} ${each.getCameraTarget()}`);
@@ -143,7 +143,7 @@ describe('previews on show', () => {
     const seen = await Promise.race([nextEvent<CustomEvent<{ splats: number }>>(element, 'preview'), element.ready]);
     assert(seen && seen.detail.splats < SLOW_SPLATS, 'a preview before the whole');
     await element.ready;
-    assertEqual(element.statistics?.splats, SLOW_SPLATS, 'the whole');
+    assertEqual(element.stats?.splats, SLOW_SPLATS, 'the whole');
   });
 
   it('a person who moves the camera in a preview keeps the place', async () => {

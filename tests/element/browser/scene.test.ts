@@ -49,7 +49,7 @@ describe('a scene', () => {
     const src = `${URL.createObjectURL(new Blob([glossy()]))}#glossy.ply`;
     const asked = await showLoaded({ src, quality: 'reference' });
     const element = await showLoaded({ src });
-    const bytes = (): number => element.statistics?.bytes ?? 0;
+    const bytes = (): number => element.stats?.bytes.scene ?? 0;
     const rounded = bytes();
     element.cameraOrbit = '40deg 80deg 5m';
     element.jumpCameraToGoal();
@@ -59,11 +59,11 @@ describe('a scene', () => {
     for (const type of ['loadstart', 'emptied', 'load', 'error']) element.addEventListener(type, () => events++);
     element.quality = 'reference';
     await until(() => bytes() > rounded, 'more exact colours', 30_000);
-    assertEqual([bytes(), events, element.loaded], [asked.statistics?.bytes, 0, true], 'bytes, events, loaded');
+    assertEqual([bytes(), events, element.loaded], [asked.stats?.bytes.scene, 0, true], 'bytes, events, loaded');
     assertEqual(String(element.getCameraOrbit()), orbit, 'the camera');
     element.quality = 'default';
     await frames();
-    assertEqual(bytes(), asked.statistics?.bytes, 'what is there stays');
+    assertEqual(bytes(), asked.stats?.bytes.scene, 'what is there stays');
   });
 
   it('fires first and last progress, then load, none of which bubbles', async () => {
@@ -89,8 +89,8 @@ describe('a scene', () => {
     assertEqual([first.loaded, first.lengthComputable], [0, false], 'first');
     assertEqual([last.loaded, last.total, last.lengthComputable], [693, 693, true], 'last');
     assert(progress.length >= 4, `several between, found ${progress.length}`);
-    assertEqual(element.statistics?.splats, 6, 'splats');
-    assertEqual(element.statistics?.dropped, 0, 'dropped');
+    assertEqual(element.stats?.splats, 6, 'splats');
+    assertEqual(element.stats?.dropped, 0, 'dropped');
     assert(element.loaded && element.error === null, 'loaded');
     for (const type of ['load', 'progress', 'error', 'camera-change']) document.body.removeEventListener(type, onBody);
   });
@@ -175,7 +175,7 @@ describe('src', () => {
     await element.ready;
     await delay(800);
     assertEqual(urls, [`${FIXTURES}green.splat`], 'loads');
-    assertEqual(element.statistics?.splats, 1, 'splats');
+    assertEqual(element.stats?.splats, 1, 'splats');
     assert(isGreen((await screenOf(element)).at(60, 50)), 'the last scene is seen');
   });
 
@@ -184,7 +184,7 @@ describe('src', () => {
     const element = show({});
     element.src = file;
     await element.ready;
-    assertEqual(element.statistics?.splats, 1, String(element.error?.message));
+    assertEqual(element.stats?.splats, 1, String(element.error?.message));
     let loads = 0;
     element.addEventListener('loadstart', () => loads++);
     element.src = COMPASS;
@@ -223,7 +223,7 @@ describe('src', () => {
     assert(isSeen && !element.loaded, 'the old scene is seen');
     await open();
     await element.ready;
-    assertEqual(element.statistics?.splats, 6, 'splats');
+    assertEqual(element.stats?.splats, 6, 'splats');
   });
 
   it('removed, clears the element', async () => {
@@ -234,7 +234,7 @@ describe('src', () => {
     element.removeAttribute('src');
     await element.ready;
     await element.updateComplete;
-    assertEqual([element.loaded, element.statistics, states(element)], [false, null, []], 'after removal');
+    assertEqual([element.loaded, element.stats, states(element)], [false, null, []], 'after removal');
     assertEqual((await screenOf(element)).at(60, 50), [255, 255, 255], 'middle');
   });
 
@@ -325,7 +325,7 @@ describe('real scenes', () => {
       const src = `/net/shared/${name}`;
       if (!(await fetch(src, { method: 'HEAD' })).ok) this.skip();
       const element = await showLoaded({ src });
-      assert((element.statistics?.splats ?? 0) > 10_000, JSON.stringify(element.statistics));
+      assert((element.stats?.splats ?? 0) > 10_000, JSON.stringify(element.stats));
       const { count } = (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 600) ?? { count: 0 };
       assert(count > 500, `${count} pixels are covered`);
     });

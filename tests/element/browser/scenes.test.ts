@@ -83,7 +83,7 @@ describe('several scenes in one element', () => {
     assertNear(await placeOf(alone, isBlue), [0, -1], 'blue');
     assertNear(await placeOf(alone, isGreen), [-2, 1], 'green');
     assert(alone.loaded, 'the element counts as loaded');
-    assertEqual(alone.statistics?.splats, 6, 'splats');
+    assertEqual(alone.stats?.splats, 6, 'splats');
   });
 
   itInLab('hide one another, whichever comes first', async () => {

@@ -40,7 +40,7 @@ describe('a sequence of files', () => {
   it('has a duration, shows the frame of every time, also one with more splats than there was room for', async () => {
     const element = await showLoaded({ src: MOVIE });
     assertEqual([element.duration, element.paused, element.currentTime], [1.2, true, 0], 'duration, paused, time');
-    assertEqual(element.statistics?.splats, 200, 'splats of the first frame');
+    assertEqual(element.stats?.splats, 200, 'splats of the first frame');
     assert(await shows(element, isRed), 'the first frame');
     for (const [seconds, isColour, splats] of [
       [0.15, isGreen, 220],
@@ -49,7 +49,7 @@ describe('a sequence of files', () => {
       [0, isRed, 200],
     ] as const) {
       await seek(element, seconds);
-      await until(() => element.statistics?.splats === splats, `${splats} splats at ${seconds} s`);
+      await until(() => element.stats?.splats === splats, `${splats} splats at ${seconds} s`);
       assert(await shows(element, isColour), `the frame at ${seconds} s`);
       for (const other of [isRed, isGreen, isBlue]) {
         if (other !== isColour) assert(!(await shows(element, other)), `nothing of other frames at ${seconds} s`);
@@ -59,7 +59,7 @@ describe('a sequence of files', () => {
 
   it('frames that say what they differ by from the first: shown for their times, over and over', async () => {
     const element = await showLoaded({ src: '/net/moving/movie.json', loop: '' });
-    assertEqual([element.duration, element.statistics?.splats], [1.2, 200], 'duration, splats');
+    assertEqual([element.duration, element.stats?.splats], [1.2, 200], 'duration, splats');
     assert(await shows(element, isRed), 'the first frame');
     for (const [seconds, isColour] of [
       [0.15, isGreen],
@@ -115,7 +115,7 @@ describe('a sequence of files', () => {
     await element.play();
     await ended;
     assertEqual([element.currentTime, element.ended, element.paused], [1.2, true, true], 'at the end');
-    await until(() => element.statistics?.splats === 420, 'the last frame');
+    await until(() => element.stats?.splats === 420, 'the last frame');
     element.loop = true;
     await element.play();
     let wraps = 0;
@@ -139,7 +139,7 @@ describe('a sequence of files', () => {
       const { currentTime } = element;
       if (currentTime < last) round++;
       last = currentTime;
-      seen[round]?.add(element.statistics?.splats ?? 0);
+      seen[round]?.add(element.stats?.splats ?? 0);
       return round >= 2;
     }, 'two rounds');
     element.pause();

@@ -73,7 +73,7 @@ async function assertSame(attributes: Readonly<Record<string, string>>): Promise
   const pictures = [];
   for (const renderer of ['webgl', 'webgpu']) {
     const element = await showLoaded({ ...WEBGL, ...attributes, renderer });
-    assertEqual([element.statistics?.renderer, element.stats?.renderer], [renderer, renderer], 'renderer');
+    assertEqual([element.stats?.renderer, element.stats?.renderer], [renderer, renderer], 'renderer');
     pictures.push(await pixelsOf(element));
     element.remove();
   }
@@ -161,7 +161,7 @@ describe('renderer="webgl"', () => {
     assertEqual(await element.positionFromPoint(2, 2), null, 'beside the scene');
     await until(() => element.queryHotspot('hotspot-front')?.visible === true, 'the label in front');
     await until(() => element.queryHotspot('hotspot-behind')?.visible === false, 'the label behind');
-    assertEqual((await element.updateStats())?.drawn, element.statistics?.splats, 'splats drawn');
+    assertEqual((await element.updateStats())?.drawn, element.stats?.splats, 'splats drawn');
   });
 
   itInLab('follows its size, and another renderer', async () => {
@@ -173,7 +173,7 @@ describe('renderer="webgl"', () => {
     for (const renderer of ['webgpu', 'webgl']) {
       element.setAttribute('renderer', renderer);
       await nextEvent(element, 'load');
-      assertEqual(element.statistics?.renderer, renderer, 'renderer');
+      assertEqual(element.stats?.renderer, renderer, 'renderer');
       const found = decibels(await pixelsOf(element), webgl);
       assert(found >= LEAST_DB, `${renderer}: ${found} dB`);
     }
@@ -188,7 +188,7 @@ describe('renderer="webgl"', () => {
     await lost;
     await restored;
     assertEqual(decibels(await pixelsOf(element), before), Infinity, 'dB');
-    assertEqual(element.statistics?.renderer, 'webgl', 'renderer');
+    assertEqual(element.stats?.renderer, 'webgl', 'renderer');
   });
 
   itInLab('many elements share one context, which is given back', async () => {
@@ -284,7 +284,7 @@ describe('without WebGPU', () => {
   it('WebGL draws by itself', async () => {
     await withoutGpu(async () => {
       const element = await showLoaded({ ...WEBGL, renderer: 'auto', src: `${FIXTURES}compass.ply` });
-      assertEqual(element.statistics?.renderer, 'webgl', 'renderer');
+      assertEqual(element.stats?.renderer, 'webgl', 'renderer');
       assert(element.matches(':state(ready)') && !element.matches(':state(unsupported)'), 'states');
     });
   });

@@ -79,7 +79,7 @@ it('axe finds nothing in them in light, dark and forced colours; the keyboard re
   }
   for (const name of ['reset-button', 'pause-button', 'previous-view', 'next-view', 'summary', 'control-input'])
     assert(reached.includes(name), `${name} is not among ${reached.join()}`);
-  assert(slider !== null && child.controls !== null, 'what the slider says is set');
+  assert(slider !== null && child.inputValues !== null, 'what the slider says is set');
   partOf(element, 'reset-button')!.focus();
   await sendKeys({ press: 'Enter' });
   await until(() => partOf(element, 'reset-button') === null, 'the button to go');

@@ -95,7 +95,7 @@ describe('a generator in the element', () => {
     assert(element.loaded, String(element.error?.message));
     await until(() => events.includes('load'), 'load');
     assertEqual(events, ['durationchange', 'loadedmetadata', 'load']);
-    assertEqual([element.statistics?.splats, element.duration, element.paused], [64, 6.2831853, true]);
+    assertEqual([element.stats?.splats, element.duration, element.paused], [64, 6.2831853, true]);
     const { count } = await pictureOf(element);
     assert(count > 500, `${count} pixels are covered`);
   });
@@ -179,7 +179,7 @@ describe('a generator in the element', () => {
     await delay(600);
     const grown = await pictureOf(slider);
     assert(grown.count > 1.05 * before.count, `attribute: ${before.count} pixels, then ${grown.count}`);
-    slider.controls = { time: -1.57 };
+    slider.inputValues = { time: -1.57 };
     await delay(600);
     const shrunk = await pictureOf(slider);
     assert(shrunk.count < 0.97 * before.count, `property: ${before.count} pixels, then ${shrunk.count}`);
@@ -262,7 +262,7 @@ describe('a generator in the element', () => {
     a.src = BALL;
     await Promise.all([a.ready, b.ready]);
     assert(a.loaded && b.loaded, `${a.error?.message} ${b.error?.message}`);
-    assertEqual([a.statistics?.splats, b.statistics?.splats], [64, 64]);
+    assertEqual([a.stats?.splats, b.stats?.splats], [64, 64]);
   });
 
   it('is slow: orbiting goes on at its own rate, and the latest time is shown in the end', async () => {

@@ -48,12 +48,12 @@ it('a pair of pictures and their pose are taken in one run, and a picture that f
     return decode(...given);
   }) as typeof decode;
   const fourth = URL.createObjectURL(await picture(270));
-  element.controls = { image: third, image_2: fourth, relative_pose: poseAt(-0.3) };
+  element.inputValues = { image: third, image_2: fourth, relative_pose: poseAt(-0.3) };
   await until(() => runs.count > before, 'a run');
   globalThis.createImageBitmap = decode;
   await delay(1000);
   assertEqual(runs.count - before, 1, 'runs for a pair and its pose');
-  element.controls = { image: third, image_2: '/net/status/404', relative_pose: poseAt(-0.2) };
+  element.inputValues = { image: third, image_2: '/net/status/404', relative_pose: poseAt(-0.2) };
   await until(() => errors.length > 0, 'word of the picture that is missing');
   await until(() => runs.count === before + 2, 'a run with the pose');
   assert(/404/.test(errors[0]), errors[0]);

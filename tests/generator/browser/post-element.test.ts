@@ -264,7 +264,7 @@ describe('a picture as a control', () => {
     assert((await count(0)) > 100 && (await count(2)) > 100, `${await count(0)} red, ${await count(2)} blue`);
     const image = new Image();
     image.src = await picture('lime', 'red');
-    element.controls = { image };
+    element.inputValues = { image };
     await until(() => image.complete, 'the image');
     const untilCounts = async (holds: (counts: number[]) => boolean, what: string): Promise<void> => {
       const end = performance.now() + 10_000;
@@ -279,11 +279,11 @@ describe('a picture as a control', () => {
     await untilCounts(([red, green, blue]) => red > 100 && green > 100 && blue < 20, 'green and red');
     assertEqual(errors, [], 'errors');
     const event = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
-    element.controls = { image: '/net/status/404' };
+    element.inputValues = { image: '/net/status/404' };
     assertEqual((await event).detail.reason, 'network/status');
     assert(element.loaded && (await count(1)) > 100, 'the last picture stays');
     const bytes = await (await fetch(await picture('blue', 'blue'))).blob();
-    element.controls = { image: await createImageBitmap(bytes) };
+    element.inputValues = { image: await createImageBitmap(bytes) };
     await untilCounts(([, green, blue]) => blue > 200 && green < 20, 'blue');
   });
 

@@ -98,9 +98,9 @@ describe('what models take, told to the page', () => {
     );
     slider.value = '0.75';
     slider.dispatchEvent(new Event('input'));
-    assertEqual(element.controls, { push: [0.75] });
+    assertEqual(element.inputValues, { push: [0.75] });
     part('controls-panel')!.querySelector('button')!.click();
-    assertEqual(element.controls, null);
+    assertEqual(element.inputValues, null);
     element.src = `${FIXTURES}shaped.onnx`;
     await until(() => labels().includes('Joint'), 'the joints');
     const fields = element.shadowRoot!.querySelectorAll<HTMLInputElement>('[part=control-input]');
@@ -134,7 +134,7 @@ describe('what models take, told to the page', () => {
     await shows(['0.5'], 1);
     element.setAttribute('control-push', '1');
     await shows(['1.0'], 1);
-    element.controls = { push: 0.25 };
+    element.inputValues = { push: 0.25 };
     await shows(['0.3'], 1);
     // Two joints as matrices: the first turned around z, by an attribute.
     element.setAttribute('pose', '0 -1 0 1 0 0 0 0 1 1 0 0 0 1 0 0 0 1');
@@ -167,9 +167,9 @@ describe('what models take, told to the page', () => {
     const slider = group()!.querySelector<HTMLInputElement>('input[type=range]')!;
     slider.value = '0.75';
     slider.dispatchEvent(new Event('input'));
-    assertEqual([child.controls, element.controls], [{ push: [0.75] }, null]);
+    assertEqual([child.inputValues, element.inputValues], [{ push: [0.75] }, null]);
     element.shadowRoot!.querySelector<HTMLElement>('[part=controls-panel] button')!.click();
-    assertEqual(child.controls, null);
+    assertEqual(child.inputValues, null);
     child.remove();
     const panel = element.shadowRoot!.querySelector<HTMLElement>('[part=controls-panel]')!;
     await until(() => panel.hidden === true, 'no panel');

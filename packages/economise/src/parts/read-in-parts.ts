@@ -2,7 +2,8 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { MOST_DROPPED, readScene, splatRanges, type SplatRanges } from '@gaussian-splat/formats';
 import { allocateColumns, closeGaps, type Columns } from './cloud-memory.js';
 import type { PartRead } from './read-part.js';
-import { partsOf, poolFor, type Part, type TaskPool } from './task-pool.js';
+import type { Part } from './cloud-memory.js';
+import { partsOf, poolFor, type TaskPool } from './task-pool.js';
 
 /** Reads a scene in memory as `readScene` does, in parts where its format and the pool allow. */
 export async function readInParts(

@@ -11,8 +11,7 @@ import { frameOf } from '../camera/settings.js';
 import type { Source } from '../stage-host.js';
 import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
 import type { Member } from '../member.js';
-import { SourceEntry, type SourceOwner } from '../source-entry.js';
-import type { Stage } from '../stage.js';
+import { SourceEntry, type EntryStage, type SourceOwner } from '../source-entry.js';
 import { cameraInScene, isSolid, matrixOf, readMatrix, sceneToWorld } from './placing.js';
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
@@ -57,8 +56,6 @@ export type SettableOf<Table> = Partial<
 export abstract class SplatChild extends ReactiveElement implements SourceOwner {
   /** What stands for it among all that its `<gaussian-splat>` shows. @internal */
   readonly holder = new SourceEntry(this);
-  /** @internal */
-  readonly startTime = 0;
   /** @internal */
   protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
   readonly #warned = new Set<string>();
@@ -179,12 +176,14 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /** @internal */
-  get overrides(): Partial<Attributes> | undefined {
-    return this.crossorigin === null ? undefined : { crossorigin: this.read('crossorigin', this.crossorigin) };
+  get overrides(): Partial<Attributes> {
+    const { autoplay, loop } = this;
+    const own = { autoplay, loop, time: null };
+    return this.crossorigin === null ? own : { ...own, crossorigin: this.read('crossorigin', this.crossorigin) };
   }
 
   /** @internal */
-  place({ scene, placement }: Member, { frame }: Stage): void {
+  place({ scene, placement }: Member, { frame }: EntryStage): void {
     const { placed, up, opacity, crop, hidden } = this.#placed;
     placement.visible = !hidden && isSolid(placed);
     if (placement.visible) placement.sceneToWorld = sceneToWorld(frame, placed, frameOf({ up }, scene.bounds));
@@ -193,7 +192,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /** @internal */
-  seenFrom(camera: Camera, member: Member | undefined, { frame }: Stage): Camera {
+  seenFrom(camera: Camera, member: Member | undefined, { frame }: EntryStage): Camera {
     const { placed, up } = this.#placed;
     // Where it will stand, before anything is known of it.
     const matrix = member?.placement.sceneToWorld ?? sceneToWorld(frame, placed, frameOf({ up }, {}));
@@ -293,7 +292,7 @@ export const childDeclarations = (
 });
 
 /** The stages of elements that have children. */
-export const stages = new WeakMap<Element, Stage>();
+export const stages = new WeakMap<Element, EntryStage>();
 
 /** Gives a child to its element. One that has not looked at its children yet asks for them itself. */
 export function adopt(child: SplatChild): void {

@@ -30,7 +30,7 @@ type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
 export class SplatSceneElement extends SplatChild {
   static override properties: PropertyDeclarations = {
     ...childDeclarations(SCENE_ATTRIBUTES),
-    controls: { attribute: false },
+    inputValues: { attribute: false },
   };
 
   declare src: Properties['src'];
@@ -42,7 +42,7 @@ export class SplatSceneElement extends SplatChild {
   declare pose: Properties['pose'];
 
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
-  declare controls: ControlValues | null;
+  declare inputValues: ControlValues | null;
   protected readonly table = SCENE_ATTRIBUTES;
   #liveValues: Omit<LiveState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;
@@ -97,7 +97,7 @@ export class SplatSceneElement extends SplatChild {
   #readLiveValues(): Omit<LiveState, 'timeSeconds'> {
     const pose = readNumbers(this.pose);
     if (pose === undefined && this.pose) this.warn('<splat-scene>: pose expects numbers; the rest pose counts.');
-    return { pose, ...readControls(this.attributes, this.controls, (sentence) => this.warn(sentence)) };
+    return { pose, ...readControls(this.attributes, this.inputValues, (sentence) => this.warn(sentence)) };
   }
 }
 

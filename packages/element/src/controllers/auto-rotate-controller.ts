@@ -1,7 +1,7 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import type { CameraController } from './camera-controller.js';
-import { MAX_MOVER_STEP_MS, type Mover } from './motion-controller.js';
+import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 
 export interface AutoRotateHost {
   readonly attributes: Pick<Attributes, 'autoRotateDelay' | 'rotationPerSecond'>;

@@ -1,5 +1,8 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
 import type { Attributes, DetailChoice } from '../attributes.js';
-import type { DetailLevers, LoadedGaussians, OwnedGaussians } from '../gpu/loaded-gaussians.js';
+import type { LoadedGaussians, OwnedGaussians } from '../gpu/loaded-gaussians.js';
+import type { DetailLevers } from '../gpu/painter.js';
+import { buildLevels } from '../detail/build-levels.js';
 import { LatestTask } from '../latest-task.js';
 import type { Services } from '../stage-host.js';
 
@@ -102,8 +105,6 @@ export class DetailController {
     this.#of = gaussians;
     this.#building.run(
       async (signal) => {
-        const { buildLevels } = await import('../detail/build-levels.js');
-        signal.throwIfAborted();
         const levels = await buildLevels(scene, this.#host.services.sceneLoader, this.#host.memoryBudget, signal);
         // A sequence may have put other splats in their place meanwhile.
         if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
@@ -112,6 +113,8 @@ export class DetailController {
       },
       (error) => {
         if (scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
+        // Code that could not be fetched is asked for again at the next update.
+        if (error instanceof GaussianSplatError && error.code === 'network/unreachable') this.#of = undefined;
         const reason = error instanceof Error ? error.message : String(error);
         this.#host.warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);
       },

@@ -1,6 +1,6 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { CameraController } from './camera-controller.js';
-import { MAX_MOVER_STEP_MS, type Mover } from './motion-controller.js';
+import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 
 export interface FlyHost {
   /** World units that count as one are the size of the scene. */

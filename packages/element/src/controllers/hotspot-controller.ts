@@ -1,12 +1,43 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { css, type ReactiveController, type ReactiveControllerHost } from 'lit';
 import { parsePoint } from '../camera/grammar.js';
 import { toScene } from '../camera/orbit.js';
 import { project } from '../camera/projection.js';
 import { ScenePoint } from '../camera/values.js';
+import { adoptStyles } from '../styles.js';
 import type { CameraController } from './camera-controller.js';
 import { labelParts } from './label-parts.js';
+
+const STYLES = css`
+  .hotspot {
+    position: absolute;
+    top: 0;
+    left: 0;
+    opacity: var(--max-hotspot-opacity, 1);
+    transition: opacity 0.3s;
+  }
+  .hotspot:not(.placed) {
+    visibility: hidden;
+  }
+  .hotspot ::slotted(*) {
+    pointer-events: auto;
+  }
+  .hotspot.hidden {
+    opacity: var(--min-hotspot-opacity, 0.25);
+  }
+  .hotspot.hidden:not(.with-panel) ::slotted(*) {
+    pointer-events: none;
+  }
+  .hotspot.hidden:focus-within {
+    opacity: var(--max-hotspot-opacity, 1);
+  }
+  @media (prefers-reduced-motion: reduce) {
+    .hotspot {
+      transition: none;
+    }
+  }
+`;
 
 export interface HotspotHost {
   readonly camera: Pick<CameraController, 'viewerFrame' | 'bounds'>;
@@ -68,6 +99,7 @@ export class HotspotController implements ReactiveController {
   constructor(host: ReactiveControllerHost & HTMLElement, of: HotspotHost) {
     this.#host = host;
     this.#of = of;
+    adoptStyles(host.shadowRoot!, STYLES);
     host.addController(this);
   }
 

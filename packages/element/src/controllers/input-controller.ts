@@ -1,6 +1,7 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { WheelZoom } from '../attributes.js';
 import { boxMoves } from '../camera/box-points.js';
+import { addHandStyles } from '../hands-view.js';
 import { DoubleTap } from '../camera/double-tap.js';
 import {
   isCameraDrag,
@@ -15,6 +16,8 @@ import {
 } from '../camera/gestures.js';
 import { isWithin, labelParts, scrollsAround } from './label-parts.js';
 
+export { handsView } from '../hands-view.js';
+export { AnnouncerController } from './announcer-controller.js';
 export { PromptController } from './prompt-controller.js';
 
 /** What people may do. */
@@ -79,6 +82,7 @@ export class InputController implements ReactiveController {
     this.#host = host;
     this.#of = of;
     host.addController(this);
+    addHandStyles(host.shadowRoot!);
   }
 
   /** The last pointer that came down was a finger. */

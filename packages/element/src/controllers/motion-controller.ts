@@ -1,33 +1,36 @@
-import type { ReactiveController, ReactiveControllerHost } from 'lit';
+/** Loaded when something moves by itself. */
+import { css, type ReactiveController, type ReactiveControllerHost, type TemplateResult } from 'lit';
+import type { Attributes } from '../attributes.js';
+import { CORNER_STYLES, cornerButton } from '../corner-button.js';
+import { adoptStyles } from '../styles.js';
+import type { SpokenStrings } from '../words.js';
+import { prefersReducedMotion } from './motion.js';
 import type { PlaybackController } from './playback-controller.js';
 
-/** Something that moves the camera by itself, frame by frame. */
-export interface Mover {
-  /**
-   * Moves on to the moment of a frame.
-   * @param now requestAnimationFrame's clock, ms.
-   * @returns whether it wants another frame.
-   */
-  advance(now: number): boolean;
-}
+const STYLES = css`
+  [part='pause-button'] {
+    display: var(--pause-button-display, block);
+  }
+  @media (hover: hover) {
+    :host(:not(:hover, :focus-within)) [part='pause-button'] {
+      opacity: 0;
+    }
+  }
+`;
 
-/** Longest step of such a motion, ms: after a pause of the picture it goes on from where it was. */
-export const MAX_MOVER_STEP_MS = 100;
-
-/** True for people who have asked their system for less motion. */
-export const prefersReducedMotion = (): boolean => reducedMotion().matches;
-
-/** The system's wish for less motion, for those who want to know when it comes or goes; documents of unit tests (jsdom) know of none. */
-export const reducedMotion = (): MediaQueryList =>
-  globalThis.matchMedia?.('(prefers-reduced-motion: reduce)') ?? new EventTarget();
+/** What the switch says, and its sign. */
+const SIGNS = {
+  pause: ['Stop the motion', 'M6 5h4v14H6zM14 5h4v14h-4z'],
+  play: ['Start the motion', 'M8 5v14l11-7z'],
+} as const;
 
 export interface MotionHost {
-  /** The page asks the camera to turn by itself. */
-  readonly autoRotates: boolean;
+  readonly attributes: Pick<Attributes, 'autoRotate'>;
   /** There is a picture to be seen that could move. */
   readonly isOnShow: boolean;
   /** What the page asks to play by itself; undefined for nothing. */
   readonly player: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'> | undefined;
+  readonly strings: SpokenStrings;
   /** Lets the camera turn at once. */
   startTurning(): void;
 }
@@ -44,6 +47,7 @@ export class MotionController implements ReactiveController {
   constructor(host: ReactiveControllerHost & HTMLElement, of: MotionHost) {
     this.#host = host;
     this.#of = of;
+    adoptStyles(host.shadowRoot!, CORNER_STYLES, STYLES);
     host.addController(this);
   }
 
@@ -59,6 +63,15 @@ export class MotionController implements ReactiveController {
     return isPlaying || (this.#canTurn && !this.#isHeld) ? 'pause' : 'play';
   }
 
+  /** The visitor's switch; undefined where nothing moves by itself. */
+  get view(): TemplateResult | undefined {
+    const action = this.switch;
+    if (action === 'none') return undefined;
+    const { strings } = this.#of;
+    const [word, sign] = SIGNS[action];
+    return cornerButton('pause-button', strings[action] ?? word, sign, () => this.toggle(), strings);
+  }
+
   /** The visitor stops all that moves by itself, or lets it move again; false if there is nothing. */
   toggle(): boolean {
     const action = this.switch;
@@ -72,11 +85,11 @@ export class MotionController implements ReactiveController {
 
   /** Attributes that are taken away and set again are the page's word, later than the visitor's. */
   hostUpdated(): void {
-    if (!this.#of.autoRotates && !this.#of.player) this.#isHeld = false;
+    if (!this.#of.attributes.autoRotate && !this.#of.player) this.#isHeld = false;
   }
 
   get #canTurn(): boolean {
-    return this.#of.autoRotates && !prefersReducedMotion();
+    return this.#of.attributes.autoRotate && !prefersReducedMotion();
   }
 
   /** Also for people who want less motion, for whom nothing plays by itself: they may want this. */

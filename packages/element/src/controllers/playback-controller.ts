@@ -1,3 +1,5 @@
+import type { Attributes } from '../attributes.js';
+
 /** What a playback tells its element: names of HTMLMediaElement's events. */
 export type PlaybackEvent =
   | 'play'
@@ -16,9 +18,8 @@ export type PlaybackEvent =
   | 'emptied';
 
 export interface PlaybackHost {
-  readonly loops: boolean;
-  /** Seconds at which a scene begins. */
-  readonly startTime: number;
+  /** `time`: seconds at which a scene begins. */
+  readonly attributes: Pick<Attributes, 'loop' | 'time'>;
   /** Asks for a frame: while it plays, or after a seek. */
   requestFrame(): void;
   playbackEvent(type: PlaybackEvent): void;
@@ -65,7 +66,8 @@ export class PlaybackController {
 
   /** Where the next scene begins. */
   get nextStart(): number {
-    return this.#nextStart ?? Math.max(0, this.#host.startTime);
+    const seconds = Number(this.#host.attributes.time);
+    return this.#nextStart ?? (Number.isFinite(seconds) ? Math.max(0, seconds) : 0);
   }
 
   /** Seeks: events follow once the frame of that time is on show. Before there is a scene this is where it starts. */
@@ -92,6 +94,11 @@ export class PlaybackController {
   /** No other scene will take the place of the one on show after all. */
   keepScene(): void {
     if (this.canPlay && this.#nextStart !== undefined) this.currentTime = this.#nextStart;
+  }
+
+  /** It begins again at its end. */
+  get loops(): boolean {
+    return this.#host.attributes.loop;
   }
 
   get seeking(): boolean {
@@ -125,7 +132,7 @@ export class PlaybackController {
     this.#isPaused = false;
     const isReverse = this.#rate < 0;
     // From the other end, as browsers have it for video.
-    if (this.#hasEnded || (!this.#host.loops && this.#time === (isReverse ? 0 : this.#duration)))
+    if (this.#hasEnded || (!this.loops && this.#time === (isReverse ? 0 : this.#duration)))
       this.currentTime = isReverse && Number.isFinite(this.#duration) ? this.#duration : 0;
     this.#host.playbackEvent('play');
     this.#lastTick = undefined;
@@ -222,7 +229,7 @@ export class PlaybackController {
     const isWithin = this.#rate < 0 ? next > 0 && next <= this.#duration : next >= 0 && next < this.#duration;
     if (isWithin) {
       this.#time = next;
-    } else if (this.#host.loops && Number.isFinite(this.#duration) && this.#duration > 0) {
+    } else if (this.loops && Number.isFinite(this.#duration) && this.#duration > 0) {
       this.#time = next - this.#duration * Math.floor(next / this.#duration);
     } else {
       this.#end(this.#rate < 0 ? 0 : this.#duration);

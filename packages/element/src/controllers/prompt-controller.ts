@@ -1,7 +1,7 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import type { CameraController } from './camera-controller.js';
-import type { Mover } from './motion-controller.js';
+import type { Mover } from './motion.js';
 
 export interface PromptHost {
   readonly attributes: Pick<Attributes, 'interactionPromptThreshold'>;

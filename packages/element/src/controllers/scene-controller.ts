@@ -1,5 +1,4 @@
 import { loadModule } from '@gaussian-splat/core';
-import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
 import type * as comeBack from '../gpu/come-back.js';
@@ -21,8 +20,6 @@ export type Entrance = 'new' | 'whole' | 'again';
 /** What the controller needs of its element, and what it tells it. */
 export interface SceneHost {
   readonly services: Services;
-  /** Whether a sequence begins again at its end. */
-  readonly loops: boolean;
   /** Whether anybody would see what there is of a scene while it loads. */
   readonly wantsPreviews: boolean;
   /** Bytes of GPU memory that the scene may take. */
@@ -307,7 +304,6 @@ export class SceneController implements ReactiveController {
       device: services.sharedDevice,
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
-      loops: () => this.#of.loops,
       live: () => this.#of.liveRequest,
       ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
     }).finally(() => this.#spare(false));
@@ -359,7 +355,7 @@ export class SceneController implements ReactiveController {
   /** Whether the scene on show may be dropped where others lack its memory: the element is gone, or another scene is to take its place. */
   #spare(isSpare: boolean): void {
     if (this.#scene === null) return;
-    const { spare } = MemoryLedger.of(this.#scene.device);
+    const { spare } = this.#scene.place.memory;
     if (isSpare || this.#releaseTimer) spare.add(this.#giveBack);
     else spare.delete(this.#giveBack);
   }
@@ -369,7 +365,7 @@ export class SceneController implements ReactiveController {
   #drop(clear: boolean): void {
     if (this.#scene !== null || clear) this.#of.hide(clear);
     if (this.#scene === null) return;
-    MemoryLedger.of(this.#scene.device).spare.delete(this.#giveBack);
+    this.#scene.place.memory.spare.delete(this.#giveBack);
     this.#scene.destroy();
     this.#scene = null;
   }

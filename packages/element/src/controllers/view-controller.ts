@@ -1,10 +1,10 @@
-import { loadModule, type Camera } from '@gaussian-splat/core';
+import { Lazy, type Camera } from '@gaussian-splat/core';
 import type { WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { targetMsOf, type FrameClient, type FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { CanvasFrame, Contents, Painter, Place, Surface } from '../gpu/painter.js';
+import type { CanvasFrame, Contents, Drawable, Painter, Place, Surface } from '../gpu/painter.js';
 import { why } from '../gpu/request-device.js';
 import type { CameraController } from './camera-controller.js';
 import type * as dynamicQuality from './pace-controller.js';
@@ -44,18 +44,8 @@ interface Settle {
   readonly reject: (reason: unknown) => void;
 }
 
-/** What sets the quality while moving. Without it all frames are whole, and none waits for it. */
-let quality: typeof dynamicQuality | undefined;
-let fetching: Promise<void> | undefined;
-
-/** Fetches it, once for all elements. Fulfils, and never rejects, when it is there or cannot be had. */
-const fetchQuality = (): Promise<void> =>
-  (fetching ??= loadModule('the code that sets the quality while moving', () => import('./pace-controller.js')).then(
-    (module) => {
-      quality = module;
-    },
-    () => undefined,
-  ));
+/** Sets the quality while moving; fetched once for all elements. Without it all frames are whole, and none waits for it. */
+const quality = new Lazy('the code that sets the quality while moving', () => import('./pace-controller.js'));
 
 /** A scene that is replaced sooner, as a preview may be, needs nothing made for it, ms. */
 const PREPARE_AFTER_MS = 300;
@@ -67,7 +57,7 @@ export class ViewController implements FrameClient {
   #painter: Painter | null = null;
   /** What is drawn into, and the device that it was set up for. */
   #surface: Surface | null = null;
-  #surfaceOf: GPUDevice | null = null;
+  #surfaceOf: Place['context'] | null = null;
   /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
   #first: Settle | undefined;
   #drawnContent = '';
@@ -81,8 +71,8 @@ export class ViewController implements FrameClient {
   get #pace(): dynamicQuality.PaceController | undefined {
     const host = this.#host;
     return (this.#ownPace ??=
-      quality &&
-      new quality.PaceController({
+      quality.value &&
+      new quality.value.PaceController({
         isOn: () => this.#isAuto,
         scheduler: () => host.scheduler,
         frameBudget: () => host.attributes.frameBudget,
@@ -124,10 +114,10 @@ export class ViewController implements FrameClient {
    * Draws what is to be shown from now on, or what has been added to it. Fulfils once the first frame of it is drawn, or at once where there is no pixel to draw;
    * rejects with GaussianSplatError `out-of-memory/*`.
    */
-  show(place: Place): Promise<void> {
-    if (place.device !== this.#painter?.device) {
+  show(scene: Drawable): Promise<void> {
+    if (scene.place.context !== this.#painter?.place.context) {
       this.#painter?.destroy();
-      const painter = place.openPainter(this.#host, {
+      const painter = scene.openPainter(this.#host, {
         onIncomplete: () => this.requestFrame(),
         onError: (error) => this.#painter === painter && this.#host.drawingFailed(error),
       });
@@ -218,10 +208,10 @@ export class ViewController implements FrameClient {
   }
 
   /** null where there is no size. */
-  #pixelsOf({ device }: Painter): PixelSize | null {
+  #pixelsOf({ place }: Painter): PixelSize | null {
     const { size, attributes, shown } = this.#host;
     const share = Math.min(1, ...shown.map(({ pixelShare }) => pixelShare));
-    return size.pixelSize(attributes.maxPixelRatio, device.limits.maxTextureDimension2D, share);
+    return size.pixelSize(attributes.maxPixelRatio, place.limits.maxTextureDimension2D, share);
   }
 
   #render(painter: Painter, request: CanvasFrame, now: number, cameraMoved: boolean): void {
@@ -253,12 +243,12 @@ export class ViewController implements FrameClient {
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
   #prepareSoon(painter: Painter): void {
     if (!this.#isAuto) return;
-    const fetched = fetchQuality();
+    quality.want();
     if (painter.isPrepared) return;
     this.#preparing ??= setTimeout(() => {
-      void fetched.then(() => {
+      void quality.settled.then(() => {
         this.#preparing = undefined;
-        if (this.#painter === painter && quality) painter.prepare(quality.MOVING_LEVERS);
+        if (this.#painter === painter && quality.value) painter.prepare(quality.value.MOVING_LEVERS);
       });
     }, PREPARE_AFTER_MS);
   }
@@ -290,12 +280,12 @@ export class ViewController implements FrameClient {
   /** null where the browser shows nothing of the kind on a canvas. */
   #surfaceFor(painter: Painter): Surface | null {
     const take = (): Surface | null => (this.#surface = painter.surfaceOn(this.#host.canvas!));
-    if (this.#surfaceOf !== painter.device && take() === null) {
+    if (this.#surfaceOf !== painter.place.context && take() === null) {
       // What has drawn on this canvas keeps it.
       this.renewCanvas();
       take();
     }
-    this.#surfaceOf = painter.device;
+    this.#surfaceOf = painter.place.context;
     return this.#surface;
   }
 }

@@ -1,8 +1,16 @@
 /** Loaded only when a page asks what its splats contribute. */
-import type { Camera } from '@gaussian-splat/core';
+import type { Camera, SplatFilter } from '@gaussian-splat/core';
+import type { FrameSettings, World } from '@gaussian-splat/renderer';
 import { readBackWith, UncheckedViewpoint, untilItHasRoom } from '@gaussian-splat/renderer/tools';
-import type { ReadCounts } from '../stats.js';
-import type { Viewport } from './viewport.js';
+import type { ReadCounts } from './painter.js';
+
+/** What is counted of: a viewport. */
+export interface Counted {
+  readonly device: GPUDevice;
+  readonly isDestroyed: boolean;
+  readonly viewpoint: Pick<UncheckedViewpoint, 'statistics'>;
+  readonly view: { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined };
+}
 
 /** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits: half a step. */
 const LEAST_WEIGHT = 0.5 / 255;
@@ -10,7 +18,7 @@ const LEAST_WEIGHT = 0.5 / 255;
 const CHUNK = 256;
 
 /** Counts of the last frame of a viewport, and of a view. Reads back from the GPU: for panels, not for frames. */
-export async function readCounts(viewport: Viewport, camera: Camera): Promise<ReadCounts> {
+export async function readCounts(viewport: Counted, camera: Camera): Promise<ReadCounts> {
   const { visible, overflow } = await viewport.viewpoint.statistics();
   if (viewport.isDestroyed) throw new Error('the frame is gone');
   return { drawn: visible, left: overflow, contributed: await countContributing(viewport, camera) };
@@ -20,7 +28,7 @@ export async function readCounts(viewport: Viewport, camera: Camera): Promise<Re
  * Counts the splats that some pixel of a view shows. Draws the view with the compute rasterizer, whatever the page uses, and reads all weights back: for
  * panels, not for frames.
  */
-async function countContributing({ device, view }: Viewport, camera: Camera): Promise<number> {
+async function countContributing({ device, view }: Counted, camera: Camera): Promise<number> {
   const { world, settings, filter } = view;
   const { STORAGE, COPY_SRC } = GPUBufferUsage;
   const size =

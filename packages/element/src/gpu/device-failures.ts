@@ -31,8 +31,8 @@ export async function isGone(painter: Pick<Painter, 'isDestroyed' | 'isLost'>): 
 }
 
 /** Whether the device was lost before all that was submitted was done. */
-export async function wasLost(painter: Pick<Painter, 'device' | 'isLost'>): Promise<boolean> {
-  await painter.device.queue.onSubmittedWorkDone().catch(() => undefined);
+export async function wasLost(painter: Pick<Painter, 'finished' | 'isLost'>): Promise<boolean> {
+  await painter.finished();
   // The loss is told a little later.
   await new Promise((resolve) => setTimeout(resolve));
   return painter.isLost;

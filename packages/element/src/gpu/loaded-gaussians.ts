@@ -1,13 +1,10 @@
-import type { FrameSettings, GaussianScene } from '@gaussian-splat/renderer';
+import type { GaussianScene } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Timeline } from '../live/live-model.js';
-import type { Contents, Painter, PainterEvents } from './painter.js';
+import type { Contents, DetailLevers, Painter, PainterEvents, Drawable, Place } from './painter.js';
 import type { DeviceLease } from './shared-device.js';
 import { Viewport } from './viewport.js';
-
-/** How much detail is drawn of a scene that has levels of it. */
-export type DetailLevers = Pick<FrameSettings, 'detail' | 'splatBudget'>;
 
 /** A scene's Gaussians with levels of detail besides; those alone are freed with it. */
 export interface OwnedLevels extends GaussianScene {
@@ -38,7 +35,7 @@ export interface MeshModel {
 }
 
 /** What one source has on the GPU: its splats, levels of detail of them, what writes them, and the lease that keeps the device. */
-export class LoadedGaussians {
+export class LoadedGaussians implements Drawable {
   /** What draws it. */
   readonly renderer: 'webgpu' | 'webgl' = 'webgpu';
   readonly #bounds: SceneBounds;
@@ -147,8 +144,13 @@ export class LoadedGaussians {
     return new Viewport(this, contents, events);
   }
 
+  /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   get device(): GPUDevice {
     return this.#lease.device;
+  }
+
+  get place(): Place {
+    return this.#lease;
   }
 
   get isLost(): boolean {

@@ -1,5 +1,17 @@
 /** What people read where there is no GPU device, or too little memory, and of other errors that few pages have. Loaded then. */
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { visitorMessages } from '../errors.js';
+
+const NO_ADAPTER =
+  'This 3D scene needs WebGPU, and this browser found no graphics adapter for it: switch on hardware acceleration or update the graphics driver.';
+Object.assign(visitorMessages, {
+  'unsupported/insecure-context':
+    'This 3D scene needs WebGPU, which browsers offer only on secure pages: open this page over https.',
+  'unsupported/no-webgpu':
+    'This 3D scene needs WebGPU, which this browser does not have: open the page in a current Chrome, Edge, Safari or Firefox.',
+  'unsupported/no-adapter': NO_ADAPTER,
+  'unsupported/limits': NO_ADAPTER,
+});
 
 export function noWebGpu(): GaussianSplatError {
   if (globalThis.isSecureContext === false) {

@@ -18,8 +18,6 @@ export interface OpenOptions {
   readonly signal: AbortSignal;
   /** Address of a frame of a sequence as it is fetched. */
   readonly frameUrl: (url: string) => string;
-  /** Whether a sequence begins again at its end. */
-  readonly loops: () => boolean;
   readonly onProgress: ProgressListener;
   /** Called with what can be shown of a scene that is still loading; the scene is the callee's. Absent: previews are not wanted. */
   readonly onPreview?: (preview: LoadedGaussians) => void;
@@ -114,8 +112,8 @@ async function openSequence(
     'the code that plays sequences',
     () => import('../live/sequence-player.js'),
   );
-  const { listeners } = options.live();
-  const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners });
+  const { listeners, loops } = options.live();
+  const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners, loops });
   const { gaussians, bounds } = player;
   const scene = new LoadedGaussians(lease, gaussians, bounds, options.submissions, { live: player });
   player.scene = scene;

@@ -4,7 +4,7 @@ import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-spl
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { Here, SceneLoader } from '../loading/scene-loader.js';
-import type { DetailLevers } from './loaded-gaussians.js';
+import type { DetailLevers } from './painter.js';
 import { isHandheld } from './memory-budget.js';
 
 export interface StreamedOptions {

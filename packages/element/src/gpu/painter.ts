@@ -1,9 +1,16 @@
 import type { Camera, GaussianSplatError, ShDegree, SplatFilter } from '@gaussian-splat/core';
-import type { PerFrameSettings, RenderSettings, FrameTarget, Quality, Rgba, World } from '@gaussian-splat/renderer';
+import type {
+  FrameSettings,
+  MemoryLedger,
+  PerFrameSettings,
+  RenderSettings,
+  FrameTarget,
+  Quality,
+  Rgba,
+  World,
+} from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
-import type { ReadCounts } from '../stats.js';
-import type { DetailLevers, LoadedGaussians } from './loaded-gaussians.js';
 
 /** How frames are drawn. */
 export interface Rendering {
@@ -15,8 +22,39 @@ export interface Rendering {
   readonly filter?: SplatFilter | undefined;
 }
 
+/** How much detail is drawn of a scene that has levels of it. */
+export type DetailLevers = Pick<FrameSettings, 'detail' | 'splatBudget'>;
+
+/** Counts that have to be read back from the GPU. */
+export interface ReadCounts {
+  readonly drawn: number;
+  /** Visible, but without room in what the device allows a buffer to hold. */
+  readonly left: number;
+  /** null where it is not counted: with WebGL. */
+  readonly contributed: number | null;
+}
+
 /** Where frames are drawn: what keeps the device, and knows what draws on it. */
-export type Place = Pick<LoadedGaussians, 'device' | 'isLost' | 'submissions' | 'openPainter'>;
+export interface Place {
+  /** What draws: places with the same one share a painter. */
+  readonly context: GPUDevice | WebGL2RenderingContext;
+  readonly limits: { readonly maxTextureDimension2D: number };
+  /** What scenes hold of its memory. */
+  readonly memory: MemoryLedger;
+  readonly isLost: boolean;
+  readonly lost: Promise<GPUDeviceLostInfo>;
+}
+
+/** A scene that is drawn: where, and by what. */
+export interface Drawable {
+  readonly place: Place;
+  /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
+  readonly device: GPUDevice;
+  /** Submissions that the painting of a frame is divided into. */
+  readonly submissions: number;
+  /** What draws frames on it. */
+  openPainter(contents: Contents, events: PainterEvents): Painter;
+}
 
 /** What frames show, as of now. */
 export interface Contents {
@@ -61,6 +99,8 @@ export interface CanvasFrame {
 
 /** Draws frames on canvases: a `Viewport` with WebGPU, a `GlPainter` with WebGL. */
 export interface Painter {
+  readonly place: Place;
+  /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
   readonly byteLength: number;
@@ -93,6 +133,8 @@ export interface Painter {
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
   /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
   readCounts(camera: Camera): Promise<ReadCounts>;
+  /** Fulfils when the GPU has done all that was asked of it, or is lost. */
+  finished(): Promise<unknown>;
   /** Frees the GPU memory. What it draws is its owner's. */
   destroy(): void;
 }

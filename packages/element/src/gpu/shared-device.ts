@@ -1,16 +1,14 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { MemoryLedger } from '@gaussian-splat/renderer';
+import type { Place } from './painter.js';
 import { requestGpuDevice, why } from './request-device.js';
 
 /** How long a device is waited for, ms. */
 const ANSWER_MS = 20_000;
 
 /** A share in the page's GPU device. */
-export interface DeviceLease {
+export interface DeviceLease extends Place {
   readonly device: GPUDevice;
-  /** Fulfils when the device is lost, for any reason other than its last lease having been released. */
-  readonly lost: Promise<GPUDeviceLostInfo>;
-  /** True once the device is lost. */
-  readonly isLost: boolean;
   /** Gives the share back; the last one destroys the device. Further calls do nothing. */
   release(): void;
 }
@@ -49,6 +47,9 @@ class DeviceSession {
     const isLost = (): boolean => this.isLost;
     return {
       device: this.device,
+      context: this.device,
+      limits: this.device.limits,
+      memory: MemoryLedger.of(this.device),
       lost,
       get isLost() {
         return isLost();

@@ -1,5 +1,5 @@
-import { loadModule, type Camera, type SplatFilter } from '@gaussian-splat/core';
-import type { PerFrameSettings, FrameSettings, World } from '@gaussian-splat/renderer';
+import { loadModule, type Camera } from '@gaussian-splat/core';
+import type { FrameSettings, PerFrameSettings } from '@gaussian-splat/renderer';
 import {
   QueueClock,
   UncheckedViewpoint,
@@ -8,14 +8,26 @@ import {
   type WorkTime,
 } from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
-import type { ReadCounts } from '../stats.js';
-import type { CanvasFrame, Contents, Painter, PainterEvents, Place, Rendering, Surface } from './painter.js';
+import type {
+  CanvasFrame,
+  Contents,
+  Drawable,
+  Painter,
+  PainterEvents,
+  Place,
+  ReadCounts,
+  Rendering,
+  Surface,
+} from './painter.js';
+import type { Counted } from './contributions.js';
 import { why } from './request-device.js';
 
 /** Draws frames on one WebGPU device: a viewpoint, whose buffers fit the frame's size, and what stands between it and the canvas. */
 export class Viewport implements Painter {
   readonly viewpoint: UncheckedViewpoint;
-  readonly #place: Place;
+  readonly device: GPUDevice;
+  readonly place: Place;
+  readonly #submissions: number;
   readonly #contents: Contents;
   readonly #events: PainterEvents;
   readonly #clock: QueueClock;
@@ -27,11 +39,13 @@ export class Viewport implements Painter {
   #drawnSize = '';
   #layout = 0;
 
-  constructor(place: Place, contents: Contents, events: PainterEvents) {
-    this.#place = place;
+  constructor({ place, device, submissions }: Drawable, contents: Contents, events: PainterEvents) {
+    this.place = place;
+    this.device = device;
+    this.#submissions = submissions;
     this.#contents = contents;
     this.#events = events;
-    this.viewpoint = new UncheckedViewpoint(place.device, contents.world, {
+    this.viewpoint = new UncheckedViewpoint(device, contents.world, {
       settings: this.#settings(),
       onIncomplete: () => {
         this.#drawnSize = '';
@@ -39,15 +53,11 @@ export class Viewport implements Painter {
         events.onIncomplete();
       },
     });
-    this.#clock = QueueClock.of(place.device);
+    this.#clock = QueueClock.of(device);
   }
 
   get byteLength(): number {
     return this.viewpoint.byteLength + (this.#filter?.byteLength ?? 0);
-  }
-
-  get device(): GPUDevice {
-    return this.#place.device;
   }
 
   get isDestroyed(): boolean {
@@ -55,7 +65,7 @@ export class Viewport implements Painter {
   }
 
   get isLost(): boolean {
-    return this.#place.isLost;
+    return this.place.isLost;
   }
 
   setRendering(rendering: Rendering): void {
@@ -82,11 +92,10 @@ export class Viewport implements Painter {
   /** Settings of a frame; with settings of motion where there are some. */
   #settings(levers?: Partial<PerFrameSettings>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
-    const { submissions } = this.#place;
     const { quality, shDegree, order } = this.#rendering;
     // Whichever leaves out more: what the page asks for, or the pace.
     const most = Math.max(detail, levers?.detail ?? 0);
-    return { quality, shDegree, order, submissions, ...levers, detail: most, splatBudget };
+    return { quality, shDegree, order, submissions: this.#submissions, ...levers, detail: most, splatBudget };
   }
 
   get isPrepared(): boolean {
@@ -149,7 +158,7 @@ export class Viewport implements Painter {
     this.#drawnSize = sizeOf(frame);
     const error = await this.#withRefusal(() => this.#draw(frame, content));
     if (error) throw await why(({ outOfMemory }) => outOfMemory('first frame', error));
-    await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
+    await this.finished();
     // The GPU has nothing to do now. Nobody waits for it.
     this.#clock.calibrate().catch(() => undefined);
   }
@@ -179,8 +188,13 @@ export class Viewport implements Painter {
   }
 
   /** What it draws at rest. */
-  get view(): { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined } {
+  get view(): Counted['view'] {
     return { world: this.#contents.world, settings: this.#settings(), filter: this.#rendering.filter };
+  }
+
+  /** Fulfils when all that was submitted is done, or the device is lost. */
+  finished(): Promise<unknown> {
+    return this.device.queue.onSubmittedWorkDone().catch(() => undefined);
   }
 
   destroy(): void {

@@ -1,5 +1,6 @@
 /** Loaded only for the attribute `controls-panel`, and where a model takes anything. */
-import type { ReactiveElement } from 'lit';
+import { css, type ReactiveElement } from 'lit';
+import { adoptStyles } from '../styles.js';
 import { readSpokenStrings, type SpokenStrings } from '../words.js';
 import type { GeneratorInput } from './inputs.js';
 import { poseOf, turnsOf } from './pose-of.js';
@@ -21,7 +22,7 @@ const SHAPE_RANGE = [-3, 3] as const;
 const SLIDER_STEPS = 200;
 const SLIDES = ['control', 'shape'];
 
-const STYLE = `
+const STYLES = css`
   [part='controls-panel'] {
     position: absolute;
     inset-block-start: 8px;
@@ -36,18 +37,41 @@ const STYLE = `
     color: var(--message-color, rgb(30 30 30));
     font: var(--message-font, 0.875rem/1.4 system-ui, sans-serif);
   }
-  [part='controls-panel'] summary { cursor: pointer; min-block-size: 24px; }
-  [part='controls-scene'] { margin: 0.5em 0 0; padding: 0; border: 0; min-inline-size: 0; }
-  [part='controls-scene'] legend { padding: 0; font-weight: 600; }
-  [part='control'] { display: grid; grid-template-columns: 1fr auto; gap: 0 0.5em; margin-block: 0.4em; }
-  [part='control-input'] { grid-column: 1 / -1; inline-size: 100%; min-block-size: 24px; box-sizing: border-box; }
-  [part='control-value'] { font-variant-numeric: tabular-nums; }
+  [part='controls-panel'] summary {
+    cursor: pointer;
+    min-block-size: 24px;
+  }
+  [part='controls-scene'] {
+    margin: 0.5em 0 0;
+    padding: 0;
+    border: 0;
+    min-inline-size: 0;
+  }
+  [part='controls-scene'] legend {
+    padding: 0;
+    font-weight: 600;
+  }
+  [part='control'] {
+    display: grid;
+    grid-template-columns: 1fr auto;
+    gap: 0 0.5em;
+    margin-block: 0.4em;
+  }
+  [part='control-input'] {
+    grid-column: 1 / -1;
+    inline-size: 100%;
+    min-block-size: 24px;
+    box-sizing: border-box;
+  }
+  [part='control-value'] {
+    font-variant-numeric: tabular-nums;
+  }
 `;
 
 /** Whose inputs are set: the element, or a `<splat-scene>` in it. */
 interface Owner extends HTMLElement, Pick<ReactiveElement, 'addController'> {
   readonly inputs: readonly GeneratorInput[];
-  controls: ControlValues | null;
+  inputValues: ControlValues | null;
   pose: Numbers | null;
 }
 
@@ -81,9 +105,7 @@ export class ControlsPanel {
     this.#strings = readSpokenStrings(element.a11y) ?? {};
     this.#box = make('section', { part: 'controls-panel' });
     const root = element.shadowRoot!;
-    const sheet = new (element.ownerDocument.defaultView ?? window).CSSStyleSheet();
-    sheet.replaceSync(STYLE);
-    root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
+    adoptStyles(root, STYLES);
     root.append(this.#box);
     element.addEventListener('inputs-change', () => this.#update());
     element.addEventListener('timeupdate', () => this.#follow());
@@ -245,8 +267,8 @@ export class ControlsPanel {
   #reset(): void {
     for (const owner of this.#owners) {
       const names = owner.inputs.map(({ name }) => name);
-      const others = Object.entries(owner.controls ?? {}).filter(([name]) => !names.includes(name));
-      owner.controls = others.length > 0 ? Object.fromEntries(others) : null;
+      const others = Object.entries(owner.inputValues ?? {}).filter(([name]) => !names.includes(name));
+      owner.inputValues = others.length > 0 ? Object.fromEntries(others) : null;
       const pose = this.#poses.get(owner);
       if (pose) owner.pose = pose.last = pose.given ?? null;
     }
@@ -262,12 +284,12 @@ export class ControlsPanel {
 
 /** What the page has set of an input. */
 function valuesOf(owner: Owner, name: string): readonly number[] | undefined {
-  const found = valueOf(owner.controls ?? {}, name);
+  const found = valueOf(owner.inputValues ?? {}, name);
   return readNumbers((found as Numbers | undefined) ?? owner.getAttribute(`control-${name.toLowerCase()}`));
 }
 
 function set(owner: Owner, name: string, value: ControlValues[string]): void {
-  owner.controls = { ...owner.controls, [name]: value };
+  owner.inputValues = { ...owner.inputValues, [name]: value };
 }
 
 /** All numbers of an input where nothing is set. */

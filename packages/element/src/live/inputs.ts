@@ -3,10 +3,10 @@ import type { GeneratorModel } from '@gaussian-splat/generator';
 
 /** What a page may set of a model, from its contract: enough to make controls for visitors. */
 export interface GeneratorInput {
-  /** As in `controls` and `control-NAME`. */
+  /** As in `inputValues` and `control-NAME`. */
   readonly name: string;
   /**
-   * `control`, `shape`, `image`: set by `control-NAME` or `controls`; `pose`: by `pose`; `time`, `frame`: by `currentTime`. Others, such as `view`, are fed by the
+   * `control`, `shape`, `image`: set by `control-NAME` or `inputValues`; `pose`: by `pose`; `time`, `frame`: by `currentTime`. Others, such as `view`, are fed by the
    * element itself.
    */
   readonly role: Exclude<InputBinding['role'], 'gaussians' | 'state'>;

@@ -69,6 +69,8 @@ export interface LiveRequest {
   /** What the model may cost. */
   readonly limits?: SceneLimits | undefined;
   readonly state: () => LiveState;
+  /** Whether the time begins again at its end. */
+  readonly loops: () => boolean;
   /** False where controls may be another model's, which then reports what neither knows. */
   readonly ownsControls: () => boolean;
   /** A camera before anything is known of the scene but, perhaps, the bounds that the contract declares. */

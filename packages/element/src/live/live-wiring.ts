@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import { Lazy, type Camera } from '@gaussian-splat/core';
 import { credentialsOf } from '../attributes.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
@@ -6,7 +6,8 @@ import type { GaussianSplatEventMap } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { StageHost } from '../stage-host.js';
 import type { LiveListeners, LiveState } from './live-model.js';
-import { PostController, type PostHost } from './post-controller.js';
+import type { Painter } from '../gpu/painter.js';
+import type { PostHost } from './post-controller.js';
 
 /** Whom the models of an element meet. */
 export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
@@ -20,7 +21,12 @@ export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'l
 
 /** What the models of an element, a generator and a post-processor, are told and whom they tell. */
 export class LiveWiring implements PostHost {
-  #post: PostController | undefined;
+  readonly #post = new Lazy('the code that runs post-processors', async () => {
+    const { PostController } = await import('./post-controller.js');
+    return new PostController(this);
+  });
+  #postUrls: readonly string[] = [];
+  #painter: Painter | null = null;
   readonly #host: LiveHost;
   #lastFault = '';
   /** How many inputs there were last. */
@@ -30,8 +36,31 @@ export class LiveWiring implements PostHost {
     this.#host = host;
   }
 
-  get post(): PostController {
-    return (this.#post ??= new PostController(this));
+  /** True if there is a post-processor, or will be. */
+  get hasPost(): boolean {
+    return this.#postUrls.length > 0;
+  }
+
+  /** @param urls absolute addresses of post-processors, in the order in which they run; none for frames as they are drawn */
+  wantPost(urls: readonly string[]): void {
+    if (urls.join(' ') === this.#postUrls.join(' ')) return;
+    this.#postUrls = urls;
+    this.#open();
+  }
+
+  /** Frames are drawn, or none any more. A painter that is destroyed closes its processor itself. */
+  attachPost(painter: Painter | null): void {
+    this.#painter = painter;
+    this.#open();
+  }
+
+  #open(): void {
+    if (this.#post.value) this.#post.value.open(this.#painter, this.#postUrls);
+    else if (this.hasPost && this.#painter)
+      this.#post.get().then(
+        (post) => post.open(this.#painter, this.#postUrls),
+        (error: unknown) => this.#fail(error),
+      );
   }
 
   get postRequest(): PostHost['postRequest'] {

@@ -1,4 +1,5 @@
 /** What only code that is loaded for models reads of their element. */
+import { Lazy } from '@gaussian-splat/core';
 import type { LiveRequest } from './live-model.js';
 
 interface ModelElement extends HTMLElement {
@@ -16,6 +17,8 @@ export const compareOf = ({
 const ownerOf = (element: HTMLElement): ModelElement | null =>
   'controlsPanel' in element ? (element as ModelElement) : element.parentElement;
 
+const panel = new Lazy('the code of the panel of controls', () => import('./controls-panel.js'));
+
 const offered = new WeakSet<HTMLElement>();
 
 /** From now on the element, or for a child the one around it, has a panel of controls whenever its attribute asks for one. */
@@ -30,7 +33,7 @@ export function offerPanel(element: HTMLElement): void {
     last = owner;
     for (const host of hosts) {
       if (!host?.controlsPanel) continue;
-      const { ControlsPanel } = await import('./controls-panel.js');
+      const { ControlsPanel } = await panel.get();
       ControlsPanel.show(host as Parameters<typeof ControlsPanel.show>[0]);
     }
   };

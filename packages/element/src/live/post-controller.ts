@@ -1,7 +1,6 @@
-import { loadModule } from '@gaussian-splat/core';
 import type { Painter } from '../gpu/painter.js';
 import { LatestTask } from '../latest-task.js';
-import type { PostRequest } from './post-view.js';
+import { PostView, type PostRequest } from './post-view.js';
 
 export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
@@ -14,55 +13,35 @@ export interface PostHost {
 /** Puts the post-processor of the attribute between the frames and the canvas. Until it is there, frames are shown as they are drawn. */
 export class PostController {
   readonly #host: PostHost;
-  #urls: readonly string[] = [];
-  #painter: Painter | null = null;
   readonly #opening = new LatestTask();
 
   constructor(host: PostHost) {
     this.#host = host;
   }
 
-  /** True where there is one, or will be. */
-  get isWanted(): boolean {
-    return this.#urls.length > 0;
-  }
-
-  /** @param urls absolute addresses, in the order in which they run; none for frames as they are drawn */
-  want(urls: readonly string[]): void {
-    if (urls.join(' ') === this.#urls.join(' ')) return;
-    this.#urls = urls;
-    this.#open();
-  }
-
-  /** Frames are drawn, or none any more. A painter that is destroyed closes its processor itself. */
-  attach(painter: Painter | null): void {
-    this.#painter = painter;
-    this.#open();
-  }
-
-  #open(): void {
+  /**
+   * @param painter null while nothing is drawn
+   * @param urls in the order in which they run; none for frames as they are drawn
+   */
+  open(painter: Painter | null, urls: readonly string[]): void {
     this.#opening.renew();
-    const painter = this.#painter;
     if (painter === null) return;
     if (painter.filter) {
       this.#host.requestFrame();
       this.#host.tellInputs();
     }
     painter.setFilter(undefined);
-    if (this.#urls.length === 0) return;
+    if (urls.length === 0) return;
     const options = this.#host.postRequest;
-    this.#opening.run((signal) => this.#load(painter, options, signal), options.onError);
+    this.#opening.run((signal) => this.#load(painter, { ...options, urls, signal }), options.onError);
   }
 
-  async #load(painter: Painter, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
-    const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
-    if (signal.aborted) return;
+  async #load(painter: Painter, request: Omit<PostRequest, 'onChange'>): Promise<void> {
+    const { signal, onError } = request;
     const view = await PostView.open(
       {
-        ...options,
-        urls: this.#urls,
-        signal,
-        onError: (error) => (signal.aborted ? undefined : options.onError(error)),
+        ...request,
+        onError: (error) => (signal.aborted ? undefined : onError(error)),
         onChange: () => this.#host.requestFrame(),
       },
       painter.device,

@@ -30,7 +30,7 @@ const RETRY_MS = 5_000;
 const MOST_TRIES = 4;
 
 /** A frame: on its way, or there. */
-interface SourceEntry {
+interface FetchedFrame {
   readonly abort: AbortController;
   packed?: PackedGaussians;
 }
@@ -52,7 +52,7 @@ export class SequencePlayer implements Timeline {
   scene: LoadedGaussians | undefined;
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
-  readonly #slots = new Map<number, SourceEntry>();
+  readonly #slots = new Map<number, FetchedFrame>();
   /** By the path of the file that did not come. */
   readonly #failures = new Map<string, Failure>();
   readonly #room: FrameRoom;
@@ -213,7 +213,7 @@ export class SequencePlayer implements Timeline {
   }
 
   async #fetch(frame: number): Promise<void> {
-    const slot: SourceEntry = { abort: new AbortController() };
+    const slot: FetchedFrame = { abort: new AbortController() };
     this.#slots.set(frame, slot);
     const { listeners } = this.#options;
     const { shPrecision } = this.#gaussians;

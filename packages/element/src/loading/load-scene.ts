@@ -1,5 +1,5 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
-import { boundsOf, GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, GaussianSplatError, Lazy, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import {
   fetchScene,
   HEADER_BYTES,
@@ -13,7 +13,6 @@ import {
 import { packGaussians } from '@gaussian-splat/renderer';
 import { limitOverdraw } from './coverage.js';
 import type { LargePly } from './large-ply.js';
-import type { PreviewSchedule } from './preview-schedule.js';
 import type * as sequences from './sequence-of.js';
 import { ProgressSum } from './progress-sum.js';
 import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
@@ -67,17 +66,16 @@ export async function loadScene(
       hasMeshes: cloud.hints?.meshes,
     });
     const start = performance.now();
-    let loading: Promise<PreviewSchedule> | undefined;
-    const previews = (): Promise<PreviewSchedule> =>
-      (loading ??= import('./preview-schedule.js').then(
-        (code) => new code.PreviewSchedule(name, signal, start, (cloud) => onPreview?.(pack(cloud)), onReading),
-      ));
+    const previews = new Lazy('the code of previews', async () => {
+      const { PreviewSchedule } = await import('./preview-schedule.js');
+      return new PreviewSchedule(name, signal, start, (cloud) => onPreview?.(pack(cloud)), onReading);
+    });
     const shared = askForHelp && new SharedReading(request, name, limits, signal, listeners);
     const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
       // Of a PLY that is large there are previews of its own.
       if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
       else if (onPreview && performance.now() - start >= PREVIEW_AFTER_MS)
-        await (await previews().catch(none))?.onArrival(bytes, total);
+        await (await previews.get().catch(none))?.onArrival(bytes, total);
     };
     const bytes = await fetchScene(url, { ...options(), onArrival });
     onReading?.(true);
@@ -96,7 +94,7 @@ export async function loadScene(
         signal,
         openPart,
         level,
-        onPreview: onPreview && (async (cloud) => (await previews().catch(none))?.onPreview(cloud)),
+        onPreview: onPreview && (async (cloud) => (await previews.get().catch(none))?.onPreview(cloud)),
       },
       ...limits(),
     });

@@ -1,13 +1,8 @@
 /** The walkable floor of a scene file; loaded by the worker when a page asks for it. */
 import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
-import { makeWalkMap, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
+import { makeWalkMap, type WalkMap } from '@gaussian-splat/formats/walk';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
-import type { FileRequest } from './protocol.js';
-
-/** A scene file, and the body that walks in it. */
-export interface FloorRequest extends FileRequest {
-  readonly options: FloorOptions;
-}
+import type { FloorRequest } from './protocol.js';
 
 /**
  * Reads a scene file once more, usually from the browser's cache, and finds its floor. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the

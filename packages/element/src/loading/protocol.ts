@@ -4,10 +4,15 @@ import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
-import type { FloorRequest } from './make-floor.js';
+import type { FloorOptions } from '@gaussian-splat/formats/walk';
 import type { LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
 import type { PackedGaussians, StreamedScene } from '@gaussian-splat/renderer';
 import type { CodedFile, LevelPage, LevelScene, ShPrecision } from '@gaussian-splat/renderer/tools';
+
+/** A scene file, and the body that walks in it. */
+export interface FloorRequest extends FileRequest {
+  readonly options: FloorOptions;
+}
 
 /** A file to fetch. */
 export interface FileRequest {

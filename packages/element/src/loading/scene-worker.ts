@@ -10,6 +10,7 @@ import {
   buffersOf,
   type BoxRequest,
   type FileRequest,
+  type FloorRequest,
   type LoadedBoxes,
   type LoadedMesh,
   type LoadedScene,
@@ -23,7 +24,6 @@ import {
 } from './protocol.js';
 import { loadScene, loadSequenceCode, named } from './load-scene.js';
 import type * as boxes from './lod-boxes.js';
-import type { FloorRequest } from './make-floor.js';
 import type { WalkMap } from '@gaussian-splat/formats/walk';
 
 export { loadScene };
@@ -39,7 +39,8 @@ export async function fetchFile(
   const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, maxBytes, maxSeconds });
   if (coded === undefined) return bytes.slice().buffer;
   // What read the manifest is there already.
-  return (await import('./open-manifest.js')).decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
+  const { decodePage } = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
+  return decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
 }
 
 const loadBoxCode = (): Promise<typeof boxes> =>
@@ -199,14 +200,23 @@ function serve(scope: WorkerScope): void {
     if (data.type === 'ping') scope.postMessage({ type: 'pong' });
     else if (data.type === 'cancel') running.get(data.id)?.abort.abort();
     else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
-    else if (data.type === 'pack') void import('./pack-shares.js').then(({ packShares }) => packShares(data.port));
+    else if (data.type === 'pack') serveWith(import('./pack-shares.js'), ({ packShares }) => packShares(data.port));
     else if (data.type === 'sort')
-      void import('./sort-splats.js').then(({ sortSplats }) => sortSplats(data.port, data.positions));
+      serveWith(import('./sort-splats.js'), ({ sortSplats }) => sortSplats(data.port, data.positions));
     else if (data.type === 'run-on-cpu')
-      void import('@gaussian-splat/generator').then(({ answerCpuRun }) => answerCpuRun(data));
+      serveWith(import('@gaussian-splat/generator'), ({ answerCpuRun }) => answerCpuRun(data));
     else void run(data.id, data);
   });
   scope.postMessage({ type: 'ready' });
+}
+
+/** In a worker that does one thing: without its code the owner gets an `error` event, which a rejection does not make. */
+function serveWith<T>(code: Promise<T>, serve: (code: T) => unknown): void {
+  code.then(serve, (error: unknown) =>
+    setTimeout(() => {
+      throw error;
+    }),
+  );
 }
 
 const isWorker = typeof document === 'undefined' && 'WorkerGlobalScope' in globalThis;

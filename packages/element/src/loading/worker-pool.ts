@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, Lazy } from '@gaussian-splat/core';
 import type { WorkerMessage, WorkerRequest } from './protocol.js';
 import { WorkerSlot, type Job } from './worker-slot.js';
 
@@ -25,6 +25,8 @@ const MOST_WORKERS = 8;
 const MOST_MOVES = 3;
 /** So often counts a death while it was read: once more, and no more. */
 const AFTER_DEATH = 2;
+
+const help = new Lazy('the code that starts workers', () => import('./start-helpers.js'));
 
 /** Why work is done on the page's thread. */
 export type Refusal = (reason: string) => void;
@@ -173,12 +175,12 @@ export class WorkerPool {
     else if (message.type === 'preview') job?.onPreview?.(message.scene);
     else if (message.type === 'answer') job?.resolve(message.answer);
     else if (message.type === 'error') job?.reject(GaussianSplatError.fromData(message.error));
-    else if (job) void this.#help(slot, job.id, message.most);
+    else if (job) this.#help(slot, job.id, message.most).catch(() => undefined);
   }
 
-  /** Other workers for one that packs a large scene: they end with what they help with. */
+  /** Other workers for one that packs a large scene: they end with what they help with. Without their code it packs alone. */
   async #help(slot: WorkerSlot, id: number, most: number): Promise<void> {
-    const { startHelpers } = await import('./start-helpers.js');
+    const { startHelpers } = await help.get();
     if (slot.jobs.has(id)) slot.helpers.set(id, startHelpers(slot.worker, id, most, this.#spawn));
   }
 

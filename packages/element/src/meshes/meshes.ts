@@ -7,7 +7,8 @@ import type { LoadedGaussians, MeshModel } from '../gpu/loaded-gaussians.js';
 import { limited } from '../gpu/open-scene.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { SourceEntry } from '../source-entry.js';
-import type { Stage } from '../stage.js';
+import type { Member } from '../member.js';
+import type { ViewerFrame } from '../camera/orbit.js';
 import { MeshLayer } from './mesh-layer.js';
 import { fetchMesh, openModel } from './open-mesh.js';
 
@@ -19,22 +20,30 @@ export interface PlacedModel {
 
 /** From a glTF's axes, y up, to those of the cloud that its splats are read as. */
 const GLTF_TO_CLOUD: Matrix4 = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+/** What meshes ask of the element. */
+interface MeshStage {
+  readonly frame: ViewerFrame;
+  warn(sentence: string): void;
+}
+
 const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /** Meshes among the splats of an element. */
 export class Meshes {
-  readonly #stage: Stage;
+  readonly #sources: { readonly members: readonly Member[] };
+  readonly #stage: MeshStage;
   /** What draws them, where there are some. */
   #layer: MeshLayer | undefined;
   #preparing = Promise.resolve();
 
-  constructor(stage: Stage) {
+  constructor(sources: { readonly members: readonly Member[] }, stage: MeshStage) {
+    this.#sources = sources;
     this.#stage = stage;
   }
 
   /** Meshes that are drawn, and where. */
   get #models(): readonly PlacedModel[] {
-    return this.#stage.sources.members.flatMap(({ scene, placement }) => {
+    return this.#sources.members.flatMap(({ scene, placement }) => {
       const { model, hasMeshes } = scene;
       if (!model || !placement.visible) return [];
       const { sceneToWorld = IDENTITY } = placement;
@@ -89,7 +98,7 @@ export class Meshes {
 
   /** Frees what nothing needs any more. */
   forget(): void {
-    if (this.#stage.sources.members.some(({ scene }) => scene.model)) return;
+    if (this.#sources.members.some(({ scene }) => scene.model)) return;
     this.#layer?.destroy();
     this.#layer = undefined;
   }

@@ -35,15 +35,13 @@ const LATE = 1.05;
 const AS_FAST = 1.05;
 /** Frames are believed to take longer by so many times in a second at most: what grows faster is another tab, or the page, more often than the scene. */
 const GROWTH = Math.exp(2.8);
-/** Belief begins at this share of the target: a frame that seemed to take nothing would keep it low for long. */
+/** Belief begins at this share of the target: after frames that took next to nothing, it would follow slow ones for seconds. */
 const LITTLE = 0.04;
 /** Milliseconds between two frames that count for this. */
 const LONGEST_STEP_MS = 100;
 /** After such a rest, ms, the clock of an idle GPU is low, for so long: frames say little. */
 const REST_MS = 250;
 const WAKING_MS = 400;
-/** Between a change and a climb, ms. */
-const SETTLE_MS = 350;
 /** Holds are longer by so many times where the last climb was regretted. */
 const LONGER = 3;
 const LONGEST_HOLD_MS = 60_000;
@@ -51,12 +49,10 @@ const LONGEST_HOLD_MS = 60_000;
 const FAR_TOO_LATE = 1.25;
 /** After so long without a change, ms, an unknown level is tried that may be in time. */
 const TRIAL_MS = 6_000;
-/** Since the last frame of a motion, ms, at most: the image at rest shows the same. */
-const AT_REST_MS = 500;
 
-/** The pace after a frame. Frames of another level are too late to say anything, but for the whole image at rest. */
+/** The pace after a frame. Frames of another level are too late to say anything. */
 export function keepPace(pace: Pace, sample: FrameSample, rules: PaceRules): Pace {
-  if (sample.level !== pace.level) return sample.level === 0 ? learnAtRest(pace, sample, rules) : pace;
+  if (sample.level !== pace.level) return pace;
   const seen = observe(pace, sample, rules);
   return choose(seen, sample.now, rules) ?? seen;
 }
@@ -74,27 +70,13 @@ function observe(pace: Pace, { now, level, milliseconds }: FrameSample, { target
   const load = pace.load || usual;
   // While the memory fills, the load is taken to be that of before the change.
   if (pace.recent.length < MEMORY && recent.length >= LEAST)
-    measured = { ...measured, [level]: { share: quantile(recent, 0.5) / load, at: now, load } };
+    measured = { ...measured, [level]: { share: usual / load, at: now, load } };
   const believed = recent.length < LEAST ? pace.believed : Math.max(LITTLE * targetMs, Math.min(most, usual));
   return { ...pace, recent, movedAt, sampledAt: now, load, measured, believed };
 }
 
-/** What frames take, ms: the mean of the middle half, since the answers for two frames that wait for one another may come together; of few frames, the fastest. */
-function usualOf(recent: readonly number[]): number {
-  if (recent.length < ENOUGH) return Math.min(...recent);
-  const cut = recent.length >> 2;
-  const middle = [...recent].sort((x, y) => x - y).slice(cut, recent.length - cut);
-  return middle.reduce((sum, time) => sum + time, 0) / middle.length;
-}
-
-/** With what the whole image took at rest, right after a motion, where that is not known of motion: other work may make frames in motion longer. */
-function learnAtRest(pace: Pace, { now, milliseconds }: FrameSample, { levels }: PaceRules): Pace {
-  const { level, recent, measured, sampledAt } = pace;
-  if (recent.length < LEAST || now - sampledAt > AT_REST_MS + milliseconds) return pace;
-  const load = usualOf(recent) / measured[level].share;
-  if (modelOf(levels, measured, { now, level, load }).isKnown[0]) return pace;
-  return { ...pace, measured: { ...measured, 0: { share: milliseconds / load, at: now, load } } };
-}
+/** What frames usually take, ms. */
+const usualOf = (recent: readonly number[]): number => quantile(recent, 0.5);
 
 /** The next level, or null where it stays. */
 function choose(pace: Pace, now: number, rules: PaceRules): Pace | null {
@@ -116,7 +98,7 @@ function bestOf(times: readonly number[], targetMs: number): number {
 }
 
 function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeModel, rules: PaceRules): Pace | null {
-  const { level, recent, direction, changedAt, turnedAt } = pace;
+  const { level, recent, direction, turnedAt } = pace;
   const { targetMs } = rules;
   const usual = times[level];
   let to = bestOf(times, targetMs);
@@ -126,12 +108,7 @@ function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeMo
       times.map((time, other) => (isKnown[other] ? time : Infinity)),
       targetMs,
     );
-  if (to === level) {
-    // Where nothing is left below and nothing known above, it may be no dearer.
-    const isLost =
-      level === rules.levels.length - 1 && now - changedAt > SETTLE_MS && !isKnown.slice(0, level).some(Boolean);
-    return isLost && level > 0 ? change(pace, now, level - 1, 'trial', times[level - 1]) : null;
-  }
+  if (to === level) return null;
   const isTurn = direction !== (to > level ? 'down' : 'up');
   const isSoon = now - turnedAt < HOLD_MS;
   const isUrgent = to > level && usual > FAR_TOO_LATE * targetMs && times[to] <= targetMs;
@@ -144,7 +121,7 @@ function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeMo
 function whereInTime(pace: Pace, now: number, times: number[], { isKnown }: TimeModel, rules: PaceRules): Pace | null {
   const { level, recent, changedAt, turnedAt, direction, hold } = pace;
   const { levels, targetMs } = rules;
-  if (recent.length < ENOUGH || now - changedAt < SETTLE_MS) return null;
+  if (recent.length < ENOUGH) return null;
   if (direction === 'down' && now - turnedAt < hold) return null;
   // What was never measured may take as much as its pixels say.
   const mostOf = (other: number): number =>

@@ -1,9 +1,11 @@
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core';
 import { css, html, nothing, render, type ReactiveController, type ReactiveControllerHost } from 'lit';
+import type { Attributes } from '../attributes.js';
+import { adoptStyles } from '../styles.js';
 import type { Behaviours } from '../behaviours.js';
 import type { Pose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
-import { prefersReducedMotion, type Mover } from '../controllers/motion-controller.js';
+import { prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import { languageOf, type SpokenStrings, type ViewWord } from '../words.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';
@@ -36,7 +38,7 @@ export interface TourHost {
   readonly settled: Promise<unknown>;
   readonly surface: HTMLElement | null;
   readonly strings: SpokenStrings;
-  readonly views: object | string | null;
+  readonly attributes: Pick<Attributes, 'views'>;
   /** Somebody sees the scene. */
   readonly isOnShow: boolean;
   warn(sentence: string): void;
@@ -109,9 +111,10 @@ export class Tour implements ReactiveController, Mover {
 
   hostUpdated(): void {
     this.#readChildren();
-    if (this.#of.views !== this.#source) {
-      this.#source = this.#of.views;
-      this.#list = this.#load(this.#of.views);
+    const { views } = this.#of.attributes;
+    if (views !== this.#source) {
+      this.#source = views;
+      this.#list = this.#load(views);
     }
     this.#show();
   }
@@ -220,12 +223,13 @@ export class Tour implements ReactiveController, Mover {
     const { behaviours, camera } = this.#of;
     const flight = (this.#flight = new Flight(camera, duration === 0 ? () => path(Infinity) : path, duration));
     behaviours.rest();
-    behaviours.announcer.isQuiet = true;
+    const announcer = behaviours.announcer.value!;
+    announcer.isQuiet = true;
     this.#of.requestFrame();
     const arrived = await flight.finished;
-    if (this.#flight === flight) behaviours.announcer.isQuiet = false;
+    if (this.#flight === flight) announcer.isQuiet = false;
     const view = this.#views[index];
-    if (arrived && view) behaviours.announcer.say(`${view.name} (${index + 1}/${this.#views.length})`);
+    if (arrived && view) announcer.say(`${view.name} (${index + 1}/${this.#views.length})`);
     return arrived;
   }
 
@@ -356,11 +360,6 @@ async function readJson(source: string, base: string): Promise<unknown> {
 function addBar(root: ShadowRoot): HTMLElement {
   const bar = root.ownerDocument.createElement('div');
   root.append(bar);
-  const view = root.ownerDocument.defaultView as (Window & typeof globalThis) | null;
-  if (view) {
-    const sheet = new view.CSSStyleSheet();
-    sheet.replaceSync(STYLES.cssText);
-    root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
-  }
+  adoptStyles(root, STYLES);
   return bar;
 }

@@ -5,7 +5,7 @@ import { eyeOfPose, type ViewerFrame } from '../camera/orbit.js';
 import type { ScenePoint } from '../camera/values.js';
 import type { AnnouncerController } from '../controllers/announcer-controller.js';
 import type { CameraController } from '../controllers/camera-controller.js';
-import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion-controller.js';
+import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { SpokenStrings, WalkWord } from '../words.js';
@@ -17,7 +17,7 @@ export interface WalkHost {
   readonly element: HTMLElement;
   readonly attributes: Pick<Attributes, 'navigation' | 'walkMap' | 'eyeHeight' | 'unit' | 'cameraControls'>;
   readonly camera: CameraController;
-  readonly behaviours: { readonly announcer: AnnouncerController };
+  readonly behaviours: { readonly announcer: { readonly value: Pick<AnnouncerController, 'say'> | undefined } };
   readonly surface: HTMLElement | null;
   readonly frame: ViewerFrame;
   readonly strings: SpokenStrings;
@@ -170,8 +170,8 @@ export class WalkController implements ReactiveController, Mover {
   /** A screen reader hears of a wall once. */
   #tellBlocked(isWalking: boolean): void {
     const isBlocked = isWalking && this.#walker!.isBlocked;
-    if (isBlocked && !this.#isSaid) this.#of.behaviours.announcer.say(this.#word('blocked'));
-    if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviours.announcer.say('');
+    if (isBlocked && !this.#isSaid) this.#of.behaviours.announcer.value?.say(this.#word('blocked'));
+    if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviours.announcer.value?.say('');
     this.#isSaid = isBlocked || (this.#isSaid && !isWalking);
   }
 

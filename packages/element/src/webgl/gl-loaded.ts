@@ -1,4 +1,3 @@
-import { MemoryLedger } from '@gaussian-splat/renderer';
 import { glBytes, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
 import { LoadedGaussians, type OwnedGaussians } from '../gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from '../gpu/memory-budget.js';
@@ -45,7 +44,7 @@ export class GlLoaded extends LoadedGaussians {
     const { signal, memoryBudget, spawn } = options;
     const { packed } = scene;
     const byteLength = glBytes(packed);
-    const ledger = MemoryLedger.of(lease.device);
+    const ledger = lease.memory;
     ledger.budgetBytes = Math.max(memoryBudget ?? 0, defaultMemoryBudget() ?? Infinity);
     const reservation = ledger.reserve(`scene of ${packed.count} splats`, byteLength, memoryBudget);
     let textures: GlGaussians | undefined;

@@ -1,7 +1,6 @@
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import { isSameView, orderView, drawn as whenDrawn, type OrderView } from '@gaussian-splat/renderer/webgl';
-import type { CanvasFrame, Painter, PainterEvents, Rendering, Surface } from '../gpu/painter.js';
-import type { ReadCounts } from '../stats.js';
+import type { CanvasFrame, Painter, PainterEvents, Place, ReadCounts, Rendering, Surface } from '../gpu/painter.js';
 import { DepthSorter, type SortedSplats } from './depth-sorter.js';
 import type { GlLoaded } from './gl-loaded.js';
 import { cannotShow } from './gl-session.js';
@@ -60,10 +59,15 @@ export class GlPainter implements Painter {
     });
   }
 
-  /** Its limits alone. */
-  get device(): GPUDevice {
-    return this.#scene.device;
+  get place(): Place {
+    return this.#scene.place;
   }
+
+  get device(): GPUDevice {
+    throw cannotShow('a post-processor');
+  }
+
+  async finished(): Promise<void> {}
 
   get byteLength(): number {
     return this.#scene.frames.byteLength;

@@ -1,9 +1,11 @@
 /** One WebGL context for all elements of a page: browsers end the oldest of more than 8 or 16. Elements show copies of what it draws. */
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { MemoryLedger } from '@gaussian-splat/renderer';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
+import type { Place } from '../gpu/painter.js';
 import type { DeviceLease } from '../gpu/shared-device.js';
 
-/** A share in the page's context. Its `device` stands where one of WebGPU is asked for. */
+/** A share in the page's context. Whoever asks it for a device of WebGPU gets an error by name. */
 export interface GlLease extends DeviceLease {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
@@ -16,7 +18,8 @@ const LOSS = { reason: 'unknown', message: 'the WebGL context was lost' } as GPU
 class GlSession {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
-  readonly device: GPUDevice;
+  readonly limits: Place['limits'];
+  readonly memory: MemoryLedger;
   isLost = false;
   /** Whom a loss is told. Not by one promise for all: it would hold on to everybody who ever waited for it. */
   readonly #listeners = new Set<() => void>();
@@ -27,10 +30,8 @@ class GlSession {
     this.clock = new GlClock(gl);
     const [width, height] = gl.getParameter(gl.MAX_VIEWPORT_DIMS) as Int32Array;
     const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
-    this.device = limitsAlone({
-      limits: { maxTextureDimension2D: Math.min(width, height, side) },
-      queue: { onSubmittedWorkDone: async () => undefined },
-    });
+    this.limits = { maxTextureDimension2D: Math.min(width, height, side) };
+    this.memory = MemoryLedger.of(gl);
     gl.canvas.addEventListener('webglcontextlost', () => {
       this.isLost = true;
       if (current === this) current = undefined;
@@ -55,7 +56,12 @@ class GlSession {
     return {
       gl: this.gl,
       clock: this.clock,
-      device: this.device,
+      context: this.gl,
+      limits: this.limits,
+      memory: this.memory,
+      get device(): never {
+        throw cannotShow('what needs WebGPU');
+      },
       lost,
       get isLost() {
         return isLost();
@@ -76,15 +82,6 @@ class GlSession {
     this.gl.getExtension('WEBGL_lose_context')?.loseContext();
   }
 }
-
-/** Has the limits of a device, and is done with all work; whatever else is asked of it is an error by name. Models that run on the GPU need WebGPU. */
-const limitsAlone = (known: object): GPUDevice =>
-  new Proxy(known, {
-    get: (target, key) => {
-      if (key in target) return Reflect.get(target, key) as unknown;
-      throw cannotShow('a post-processor');
-    },
-  }) as GPUDevice;
 
 let current: GlSession | undefined;
 

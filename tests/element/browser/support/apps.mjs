@@ -84,7 +84,7 @@ export function plainApp(address) {
           '<button slot="hotspot-forehead" data-position="0m 0.33m 0.25m">The forehead</button></gaussian-splat>';
         const splat = place.firstElementChild;
         splat.src = scenes[scene];
-        splat.controls = controls;
+        splat.inputValues = controls;
         splat.addEventListener('load', ({ detail }) => (count('loads'), (status.textContent = 'loaded ' + detail.url)));
         splat.addEventListener('error', ({ detail }) => (status.textContent = detail.code + ': ' + detail.message));
         splat.addEventListener('camera-change', () => count('moves'));
@@ -102,7 +102,7 @@ export function plainApp(address) {
       });
       document.getElementById('view').addEventListener('click', () => {
         const splat = place.firstElementChild;
-        where.textContent = splat.getCameraOrbit() + ', controls by reference: ' + (splat.controls === controls);
+        where.textContent = splat.getCameraOrbit() + ', controls by reference: ' + (splat.inputValues === controls);
       });
       mount();
     </script>`;

@@ -23,6 +23,15 @@ export function hostileServer(otherOrigin) {
       context.respond = false;
       return void context.res.writeHead(404, { 'Cache-Control': 'no-store' }).end();
     }
+    const once = refused.folder && context.path.startsWith(refused.folder) && HASHED.test(context.path);
+    if (once) {
+      const name = context.path.slice(refused.folder.length);
+      refused.served[name] = (refused.served[name] ?? -1) + 1;
+      if (refused.served[name] === 0) {
+        context.respond = false;
+        return void context.res.writeHead(404, { 'Cache-Control': 'no-store' }).end();
+      }
+    }
     if (held.file && net !== 'net' && context.path.endsWith(held.file)) await delay(held.ms);
     if (net !== 'net' || !(kind in ANSWERS)) return next();
     context.set('Cache-Control', 'no-store');
@@ -32,6 +41,10 @@ export function hostileServer(otherOrigin) {
 
 /** Ends of paths that are not found. */
 let lost = [];
+/** Chunks of a build in this folder are not found when they are asked for first; and how often each has been served. */
+const refused = { folder: '', served: {} };
+/** Names of chunks that few pages need carry a hash. */
+const HASHED = /-[\w-]{8}\.js$/;
 /** The end of a path whose answer waits. */
 let held = { file: '', ms: 0 };
 
@@ -85,6 +98,16 @@ const ANSWERS = {
   lose(context, ends) {
     lost = ends ? ends.split(',').map((end) => `/${end}`) : [];
     context.status = 204;
+  },
+
+  /** From now on each chunk of a folder is not found once. */
+  'refuse-once'(context, folder) {
+    Object.assign(refused, { folder: `/${folder}`, served: {} });
+    context.status = 204;
+  },
+
+  refused(context) {
+    context.body = JSON.stringify(refused.served);
   },
 
   /** From now on a file, by the end of its path, comes `ms` later. */

@@ -11,7 +11,7 @@ describe('the page of trained examples', () => {
     const { page, card, element } = await openCard('statue');
     const pictures = [...card.querySelectorAll<HTMLImageElement>('.given img')];
     await until(() => pictures.every(({ complete, naturalWidth }) => complete && naturalWidth === 256), 'pictures');
-    const given = element.controls as Record<string, string | number[]>;
+    const given = element.inputValues as Record<string, string | number[]>;
     assertEqual(Object.keys(given).sort(), ['focal_length', 'image', 'image_2', 'principal_point', 'relative_pose']);
     assertEqual(
       [given.image, given.image_2],
@@ -21,7 +21,7 @@ describe('the page of trained examples', () => {
     const [statue, angel] = card.querySelectorAll<HTMLButtonElement>('[data-pair]');
     angel.click();
     await until(() => angel.getAttribute('aria-pressed') === 'true', 'the other pair');
-    const other = element.controls as Record<string, string | number[]>;
+    const other = element.inputValues as Record<string, string | number[]>;
     assert(String(other.image).endsWith('statue/angel/image.png'), String(other.image));
     assert(other.relative_pose.toString() !== given.relative_pose.toString(), 'another pose');
     assertEqual(statue.getAttribute('aria-pressed'), 'false');

@@ -67,7 +67,7 @@ export const slide = (card: HTMLElement, selector: string, value: number): void 
 
 /** Runs on the GPU, is drawn, and tells what it costs. */
 export async function assertShown({ card, element, fallbacks }: OpenExample, gaussians: number): Promise<void> {
-  assertEqual([element.statistics?.splats, fallbacks], [gaussians, []]);
+  assertEqual([element.stats?.splats, fallbacks], [gaussians, []]);
   // The page behind is lighter than that.
   const dark = (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 560)?.count ?? 0;
   const covered = dark / (element.clientWidth * element.clientHeight);
