@@ -3,7 +3,7 @@ import { loadModule } from './load-module.js';
 /** After a failure {@link Lazy.want} asks again no sooner, ms. */
 const PAUSE_MS = 5_000;
 
-/** Code that few pages need, fetched when it is first asked for. A failure is not remembered: whoever asks next fetches again. */
+/** Code that few pages need, fetched on its first use. A failure is not remembered: the next use fetches it again. */
 export class Lazy<T> {
   /** Present once the code is there. */
   value: T | undefined;
