@@ -237,8 +237,9 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   }
 
   get attributes(): Attributes {
-    const { attributes } = this.#stage!;
-    return this.owner.overrides ? { ...attributes, ...this.owner.overrides } : attributes;
+    const { overrides } = this.owner;
+    // A child knows its own before it belongs to an element.
+    return overrides ? { ...(this.#stage?.attributes as Attributes), ...overrides } : this.#stage!.attributes;
   }
 
   get services(): Services {

@@ -346,7 +346,10 @@ describe('accessibility', () => {
     await element.updateComplete;
     assertEqual(described(), ['application', 'A skull'], 'controls');
     assert(view && view.hasAttribute('aria-roledescription'), 'a role description');
-    const help = element.shadowRoot?.getElementById(view.getAttribute('aria-describedby') ?? '');
+    const helpOf = (): HTMLElement | null | undefined =>
+      element.shadowRoot?.getElementById(view.getAttribute('aria-describedby') ?? '');
+    await until(() => !!helpOf(), 'the help, which comes with what listens to keys');
+    const help = helpOf();
     assert(/Arrow keys/.test(help?.textContent ?? ''), 'the keys are described');
     element.cameraControls = false;
     element.alt = '';
