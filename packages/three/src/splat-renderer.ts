@@ -5,13 +5,14 @@ import {
   type Camera as SplatCamera,
 } from '@gaussian-splat/core';
 import { LinearColours, SceneDepth, type FrameSettings } from '@gaussian-splat/renderer';
-import { texture } from 'three/tsl';
+import { texture, toneMapping, toneMappingExposure } from 'three/tsl';
 import {
   DepthTexture,
   FloatType,
   HalfFloatType,
   Matrix4,
   NodeMaterial,
+  NoToneMapping,
   QuadMesh,
   RenderTarget,
   Quaternion,
@@ -21,6 +22,7 @@ import {
   type Camera,
   type Object3D,
   type Texture,
+  type ToneMapping,
   type WebGPURenderer,
 } from 'three/webgpu';
 import { generatedSplatsHost } from './generated-splats.js';
@@ -53,7 +55,10 @@ export class SplatRenderer {
   readonly #worlds = new Map<Object3D, Map<Camera, SplatWorld>>();
   readonly #depths = new WeakMap<GPUTexture, Map<boolean, SceneDepth>>();
   readonly #size = new Vector2();
-  #frame: { readonly target: RenderTarget; readonly material: NodeMaterial; readonly quad: QuadMesh } | undefined;
+  /** The meshes of a frame, and the splats unless there is tone mapping. */
+  #frame: Picture | undefined;
+  /** The meshes with tone mapping, and the splats. */
+  #mapped: { readonly picture: Picture; readonly map: Quad; readonly curve: ToneMapping } | undefined;
 
   /** @throws GaussianSplatError `argument/value` for a renderer that is not initialised, or does not draw with WebGPU. */
   constructor(renderer: WebGPURenderer, options: SplatRendererOptions = {}) {
@@ -72,16 +77,23 @@ export class SplatRenderer {
     registerSceneHost(generatedSplatsHost);
   }
 
-  /** Draws meshes and splats to where the renderer draws: a render target, or the canvas with its tone mapping and colour space. */
+  /**
+   * Draws meshes and splats to where the renderer draws: a render target, or the canvas with its tone mapping and color space. Tone mapping is that of the meshes: splats are
+   * captured with a tone curve in their colors.
+   */
   render(scene: Object3D, camera: Camera): void {
     const renderer = this.#renderer;
-    const { target, quad } = this.#frameOf();
+    const { toneMapping: curve, isOutputTarget } = renderer;
     const before = renderer.getRenderTarget();
-    renderer.setRenderTarget(target);
+    const drawn = this.#frameOf();
+    renderer.setRenderTarget(drawn.target);
     renderer.render(scene, camera);
+    const shown = isOutputTarget && curve !== NoToneMapping ? this.#map(drawn, curve) : drawn;
+    this.#drawInto(scene, camera, shown.target, drawn.target.depthTexture);
     renderer.setRenderTarget(before);
-    this.draw(scene, camera, target);
-    quad.render(renderer);
+    renderer.toneMapping = NoToneMapping;
+    shown.copy.quad.render(renderer);
+    renderer.toneMapping = curve;
   }
 
   /**
@@ -90,6 +102,10 @@ export class SplatRenderer {
    * @throws GaussianSplatError `argument/value` for another target; `argument/camera` for a camera with a skewed projection.
    */
   draw(scene: Object3D, camera: Camera, target: RenderTarget): void {
+    this.#drawInto(scene, camera, target, target.depthTexture);
+  }
+
+  #drawInto(scene: Object3D, camera: Camera, target: RenderTarget, stored: DepthTexture | null): void {
     const world = this.#worldOf(scene, camera);
     world.follow(scene, camera);
     if (world.isEmpty) return;
@@ -97,7 +113,7 @@ export class SplatRenderer {
       ...{ width: target.width, height: target.height },
       clipDepth: camera.coordinateSystem === WebGPUCoordinateSystem ? '0..1' : '-1..1',
     });
-    const depth = target.depthTexture ? this.#depthOf(this.#gpu(target.depthTexture), camera) : undefined;
+    const depth = stored ? this.#depthOf(this.#gpu(stored), camera) : undefined;
     const picture = { target: this.#gpu(target.texture), over: 'target', colours: this.#colours, depth } as const;
     world.viewpoint.draw(view, picture);
   }
@@ -135,10 +151,9 @@ export class SplatRenderer {
     }
     if (camera !== undefined) return;
     this.#colours.destroy();
-    this.#frame?.target.depthTexture?.dispose();
-    this.#frame?.target.dispose();
-    this.#frame?.material.dispose();
+    disposePicture(this.#frame);
     this.#frame = undefined;
+    this.#forgetMapped();
   }
 
   #worldOf(scene: Object3D, camera: Camera): SplatWorld {
@@ -153,19 +168,31 @@ export class SplatRenderer {
   }
 
   /** Where a whole frame is drawn before it goes to the canvas. */
-  #frameOf() {
-    const to = this.#renderer.getRenderTarget() ?? drawingBuffer(this.#renderer, this.#size);
-    if (this.#frame === undefined) {
-      const depthTexture = new DepthTexture(to.width, to.height, FloatType);
-      const target = new RenderTarget(to.width, to.height, { type: HalfFloatType, depthTexture });
-      const material = new NodeMaterial();
-      material.fragmentNode = texture(target.texture);
-      material.depthTest = false;
-      material.depthWrite = false;
-      this.#frame = { target, material, quad: new QuadMesh(material) };
-    }
-    this.#frame.target.setSize(to.width, to.height);
+  #frameOf(): Picture {
+    const { width, height } = this.#renderer.getRenderTarget() ?? drawingBuffer(this.#renderer, this.#size);
+    this.#frame ??= pictureOf(new DepthTexture(width, height, FloatType));
+    this.#frame.target.setSize(width, height);
     return this.#frame;
+  }
+
+  /** Draws a picture with a tone curve. */
+  #map(drawn: Picture, curve: ToneMapping): Picture {
+    if (this.#mapped?.curve !== curve) {
+      this.#forgetMapped();
+      const map = quadOf(toneMapping(curve, toneMappingExposure, texture(drawn.target.texture)));
+      this.#mapped = { picture: pictureOf(), map, curve };
+    }
+    const { picture, map } = this.#mapped!;
+    picture.target.setSize(drawn.target.width, drawn.target.height);
+    this.#renderer.setRenderTarget(picture.target);
+    map.quad.render(this.#renderer);
+    return picture;
+  }
+
+  #forgetMapped(): void {
+    this.#mapped?.map.material.dispose();
+    disposePicture(this.#mapped?.picture);
+    this.#mapped = undefined;
   }
 
   #depthOf(stored: GPUTexture, { reversedDepth = false }: Camera): SceneDepth {
@@ -190,6 +217,36 @@ export class SplatRenderer {
       );
     return made;
   }
+}
+
+interface Quad {
+  readonly material: NodeMaterial;
+  readonly quad: QuadMesh;
+}
+
+/** A frame in linear light, and what copies it. */
+interface Picture {
+  readonly target: RenderTarget;
+  readonly copy: Quad;
+}
+
+function quadOf(colors: NodeMaterial['fragmentNode']): Quad {
+  const material = new NodeMaterial();
+  material.fragmentNode = colors;
+  material.depthTest = false;
+  material.depthWrite = false;
+  return { material, quad: new QuadMesh(material) };
+}
+
+function pictureOf(depthTexture: DepthTexture | null = null): Picture {
+  const target = new RenderTarget(1, 1, { type: HalfFloatType, depthTexture, depthBuffer: depthTexture !== null });
+  return { target, copy: quadOf(texture(target.texture)) };
+}
+
+function disposePicture(picture: Picture | undefined): void {
+  picture?.target.depthTexture?.dispose();
+  picture?.target.dispose();
+  picture?.copy.material.dispose();
 }
 
 const drawingBuffer = (renderer: WebGPURenderer, size: Vector2): { width: number; height: number } => {

@@ -118,6 +118,8 @@ export class WebGPURenderer {
   init(): Promise<this>;
   setSize(width: number, height: number, updateStyle?: boolean): void;
   dispose(): void;
+  toneMapping: ToneMapping;
+  readonly isOutputTarget: boolean;
   readonly backend: {
     readonly isWebGPUBackend?: boolean;
     readonly device?: GPUDevice | null;
@@ -132,3 +134,6 @@ export class WebGPURenderer {
 export const FloatType: number;
 export const HalfFloatType: number;
 export const WebGPUCoordinateSystem: number;
+export type ToneMapping = number;
+export const NoToneMapping: ToneMapping;
+export const ACESFilmicToneMapping: ToneMapping;

@@ -12,10 +12,12 @@ import {
 import { GaussianModels } from '@gaussian-splat/generator';
 import { type GeneratedSplats, SplatRenderer, SplatScene } from '@gaussian-splat/three';
 import {
+  ACESFilmicToneMapping,
   BoxGeometry,
   Color,
   Mesh,
   MeshBasicMaterial,
+  NoToneMapping,
   OrthographicCamera,
   PerspectiveCamera,
   Scene,
@@ -142,6 +144,24 @@ describe('splats in a three.js scene', () => {
       assert(isNear(at(crossed, front, y), at(barAlone, front, y), 1), `in front: ${at(crossed, front, y)}`);
       assert(!isNear(at(crossed, back, y), at(barAlone, back, y), 30), `behind: ${at(crossed, back, y)}`);
       if (back < WIDTH / 2) assert(isNear(at(crossed, back, y), at(wallAlone, back, y), 4), 'the opaque half hides it');
+
+      // A tone curve is for meshes: splats have one in their colors.
+      renderer.toneMapping = ACESFilmicToneMapping;
+      bar.visible = true;
+      placed.visible = false;
+      splats.render(scene, perspective);
+      const mapped = shown(canvas);
+      assert(worst(mapped, barAlone) > 20, 'the bar has the tone curve');
+      placed.visible = true;
+      splats.render(scene, perspective);
+      const together = shown(canvas);
+      assert(isNear(at(together, front, y), at(mapped, front, y), 1), 'the bar is as without splats');
+      bar.visible = false;
+      splats.render(scene, perspective);
+      // Half of the wall is opaque: no background, which has the curve, shows through.
+      const [x, above] = [WIDTH / 2 - 30, HEIGHT / 2 - 20];
+      assert(isNear(at(shown(canvas), x, above), at(wallAlone, x, above), 2), `splats: ${at(shown(canvas), x, above)}`);
+      renderer.toneMapping = NoToneMapping;
 
       // Hiding, and a second camera, cost the first one nothing of its picture.
       bar.visible = true;
