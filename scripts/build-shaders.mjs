@@ -18,6 +18,7 @@ const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
+  'auxiliary-shaders': ['rasterize_tiles_auxiliary'],
   'probe-shaders': ['probe_depth', 'probe_surface', 'probe_surface_quantized'],
   'depth-shaders': ['blend_layers', 'rasterize_quads_depth', 'rasterize_tiles_depth'],
   'linear-shaders': ['compose_linear'],

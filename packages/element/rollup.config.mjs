@@ -164,7 +164,7 @@ export default [
     // Imports for nothing but their effects, which these do not have, would make bundlers warn.
     treeshake: { moduleSideEffects: (_, isExternal) => !isExternal },
     // Lit and the errors' class may be the app's own, too.
-    external: (id) => /^(lit|@lit|@gaussian-splat\/core(\/contract|\/onnx)?$)/.test(id) || KEPT.test(id),
+    external: (id) => /^(lit|@lit|@gaussian-splat\/core(\/contract|\/onnx|\/fetch)?$)/.test(id) || KEPT.test(id),
     plugins,
     output: {
       ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500, hoistTransitiveImports: false },

@@ -1,5 +1,6 @@
 /** What the charts of splats drawn against splats that show have in common: views of a scene at growing distances, their pictures, and what shows in them. */
 import { lookAt } from '@gaussian-splat/core';
+import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 
 /** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits. */
 const LEAST_WEIGHT = 0.5 / 255;
@@ -44,7 +45,7 @@ export async function draw(device, renderer, gaussians, camera, detail = 0) {
   const target = device.createTexture({ size: [width, height], format: 'rgba32float', usage });
   const splats = gaussians.pages.reduce((sum, page) => sum + 256 * Math.ceil(page.count / 256), 0);
   const contributions = device.createBuffer({ size: 4 * splats, usage: 0x80 | 0x4 });
-  do renderer.render({ gaussians, camera, target, detail, auxiliary: { contributions } });
+  do renderer.render({ gaussians, camera, target, detail, auxiliary: new AuxiliaryOutputs({ contributions }) });
   while (!(await renderer.isComplete()));
   const { visible } = await renderer.statistics();
   const weights = await read(device, 4 * splats, (encoder, staging) =>

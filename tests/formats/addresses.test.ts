@@ -4,7 +4,8 @@
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { GaussianSplatError, partRequest } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { partRequest } from '@gaussian-splat/core/fetch';
 
 const manifest = { url: 'https://x.test/a/scene.json?v=1', credentials: 'include' } as const;
 

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { createServer } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, beforeEach, test } from 'node:test';
-import { partUrl } from '@gaussian-splat/core';
+import { partUrl } from '@gaussian-splat/core/fetch';
 import { fetchScene, openPartAt, readCoarsest, readLodScene, readScene, SogFiles } from '@gaussian-splat/formats';
 import { lodFolder } from '../support/lod-folder.js';
 import { assertSameCloud } from './support/expect.js';

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
-import { packedOrder } from '@gaussian-splat/renderer/tools';
+import { AuxiliaryOutputs, packedOrder } from '@gaussian-splat/renderer/tools';
 import { toCamera, worldPosition } from '../oracle/projection.js';
 import { renderOracle } from '../oracle/oracle.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
@@ -44,7 +44,13 @@ async function notesOf(device: GPUDevice, cloud: GaussianCloud, cameras: readonl
   const depth = device.createTexture({ size: [width, height], format: 'r32float', usage });
   const images: Float32Array[] = [];
   for (const camera of cameras) {
-    images.push(await readFrame(device, renderer, { gaussians, camera, auxiliary: { contributions, depth } }));
+    images.push(
+      await readFrame(device, renderer, {
+        gaussians,
+        camera,
+        auxiliary: new AuxiliaryOutputs({ contributions, depth }),
+      }),
+    );
   }
   const noted = { weights: await readBuffer(device, contributions), depths: await readBuffer(device, depth) };
   const plain = await readFrame(device, renderer, { gaussians, camera: cameras.at(-1)! });
@@ -107,7 +113,7 @@ test('quads refuse auxiliary outputs, by name', async () => {
     format: 'rgba8unorm',
     usage: 0x10,
   });
-  assert.throws(() => renderer.render({ gaussians, camera: cameras[0], target, auxiliary: {} }), {
+  assert.throws(() => renderer.render({ gaussians, camera: cameras[0], target, auxiliary: new AuxiliaryOutputs() }), {
     code: 'unsupported/limits',
     where: 'FrameTarget.auxiliary',
   });

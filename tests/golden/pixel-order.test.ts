@@ -14,6 +14,7 @@ import {
   World,
   type RendererOptions,
 } from '@gaussian-splat/renderer';
+import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 import { renderOracle, renderOracleWorld, toRgba, type Mode } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
 import { cloudOf, repeat } from '../support/clouds.js';
@@ -181,7 +182,9 @@ test('what does not fit is refused by name', async () => {
   const viewpoint = new Viewpoint(device, new World(), { settings: { order: 'pixel' } });
   assert.equal(viewpoint.rasterizer, 'tiles');
   const target = device.createTexture({ size: [view.width, view.height], format: 'rgba8unorm', usage: 0x10 });
-  assert.throws(() => viewpoint.draw(view, { target, auxiliary: {} }), { where: 'FrameTarget.auxiliary' });
+  assert.throws(() => viewpoint.draw(view, { target, auxiliary: new AuxiliaryOutputs() }), {
+    where: 'FrameTarget.auxiliary',
+  });
   viewpoint.destroy();
   target.destroy();
 });

@@ -1,6 +1,7 @@
 import { readFile } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
-import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { partUrl } from '@gaussian-splat/core/fetch';
 import { sidecarName } from '@gaussian-splat/core/contract';
 import { openUrl, type ByteSource, type ExternalFile, type UrlSource } from '@gaussian-splat/core/onnx';
 import { externalSizes, FileSource } from './file-source.js';

@@ -6,7 +6,5 @@ export * from './half.js';
 export * from './linear.js';
 export * from './lazy.js';
 export * from './load-module.js';
-export * from './part-request.js';
-export * from './patient-fetch.js';
 export * from './scene-host.js';
 export * from './vector.js';

@@ -7,6 +7,7 @@ const FOLDER = fileURLToPath(new URL('../../renderer/dist/generated/', import.me
 /** Where scripts/build-shaders.mjs and the compiler put the pieces that shaders are joined of. */
 export const SHADER_FILES = [
   'shaders.js',
+  'auxiliary-shaders.js',
   'budget-shaders.js',
   'live-shaders.js',
   'streamed-shaders.js',

@@ -255,7 +255,7 @@ export const ATTRIBUTES = {
   /**
    * URL of a map of the floor for `navigation="walk"`, written by `gaussian-splat floor`. `auto` makes one from the splats after the scene has loaded.
    * @default `auto`
-   * @example walk-map="museum.floor"
+   * @example walk-map="garden.floor"
    */
   walkMap: read({ expected: 'auto, or a URL', fallback: 'auto', parse: (written): string => written.trim() || 'auto' }),
   /**

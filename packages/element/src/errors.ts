@@ -44,7 +44,7 @@ export function visitorMessage({ code, reason }: ElementError, strings: SpokenSt
 
 /** Those of single errors; code that makes such an error adds its own. */
 export const visitorMessages: Partial<Record<ErrorCode, string>> = {
-  'unsupported/wrong-image': 'This 3D scene cannot be drawn correctly here: update the browser or the graphics driver.',
+  'unsupported/wrong-image': 'This 3D scene cannot be drawn correctly here: update the browser or graphics driver.',
 };
 
 const VISITOR_MESSAGES: Readonly<Record<ElementErrorCode, string>> = {

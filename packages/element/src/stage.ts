@@ -13,7 +13,6 @@ import type { HotspotHost } from './controllers/hotspot-controller.js';
 import type { InputHost, InputOptions } from './controllers/input-controller.js';
 import { prefersReducedMotion } from './controllers/motion.js';
 import type { PlaybackController } from './controllers/playback-controller.js';
-import { PrintController } from './controllers/print-controller.js';
 import { RevealController, type RevealHost } from './controllers/reveal-controller.js';
 import { SizeController, windowOf } from './controllers/size-controller.js';
 import { ViewController, type ViewHost } from './controllers/view-controller.js';
@@ -91,6 +90,11 @@ export class Stage
     },
     this.#update,
   );
+  /** Puts the frame on paper; fetched after the first frame. */
+  readonly #print = new Lazy('the code for printing', async () => {
+    const { PrintController } = await import('./controllers/print-controller.js');
+    return new PrintController(this.element, () => this.drawNow());
+  });
   /** Labels of the page. */
   readonly labels = new Lazy(
     'the code of labels',
@@ -131,7 +135,6 @@ export class Stage
     this.sources = new SourceList(this, new SourceEntry(this, this));
     this.reveal = new RevealController(element, this);
     this.behaviours = new Behaviours(element, this);
-    new PrintController(element, () => this.drawNow());
     const onPageVisibility = (): void => this.sources.suspend();
     element.addController({
       hostConnected: () => {
@@ -293,7 +296,7 @@ export class Stage
 
   /** Fulfils, and never rejects, when nothing is left to wait for, code for attributes and children included. */
   get settled(): Promise<unknown> {
-    const code = [this.#composition, this.labels, this.#hands].map(({ settled }) => settled);
+    const code = [this.#print, this.#composition, this.labels, this.#hands].map(({ settled }) => settled);
     return Promise.all(code).then(() => this.sources.settled);
   }
 
@@ -423,6 +426,7 @@ export class Stage
 
   /** Draws what is in the world from now on. Fulfils with the first frame of it. */
   draw(scene: Drawable): Promise<void> {
+    this.#print.get().catch(this.#warnOf);
     const drawn = this.view.show(scene);
     this.live.attachPost(this.view.painter);
     return drawn;

@@ -36,7 +36,7 @@ export function plainBytes(file: FileBytes, name: string): Uint8Array {
     where: name,
     expected: 'the bytes of a scene file: a Uint8Array or an ArrayBuffer',
     found: kindOf(file),
-    remedy: 'fetch the file and pass what response.arrayBuffer() resolves to, or call fetchScene(url)',
+    remedy: 'pass the bytes of the file, or call fetchScene(url)',
   });
 }
 

@@ -1,4 +1,4 @@
-import { chunksOf, fetchPatiently, SilenceError } from '@gaussian-splat/core';
+import { chunksOf, fetchPatiently, SilenceError } from '@gaussian-splat/core/fetch';
 import { refuse } from './budget.js';
 import { grouped, GrowingBytes } from './bytes.js';
 import { badStatus, forbidden, interrupted, label, unreachable } from './network-errors.js';

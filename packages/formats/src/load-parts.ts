@@ -12,7 +12,7 @@ export const loadReader = ({ title, load }: SceneFormat): Promise<SceneReader> =
 
 /** What knows files that are no scene. */
 export const loadDiagnosis = (): Promise<typeof diagnosis> =>
-  loadModule('the code that tells what a file is that is no scene', () => import('./diagnose.js'));
+  loadModule('the code for other files', () => import('./diagnose.js'));
 
 /** What knows formats without a signature. */
 export const loadDetection = (): Promise<typeof detection> =>

@@ -1,6 +1,6 @@
 import type { Capacity, CapacityMemory, LookedAt } from './capacity-memory.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { copyCounts } from './statistics.js';
+import { copyCounts } from './copy-counts.js';
 
 /** Between which bounds the room stays; the lower one may change, and is asked for at every look. */
 export interface CapacityBounds {

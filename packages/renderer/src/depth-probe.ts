@@ -88,8 +88,7 @@ export async function probe(
     recordSurfaces(device, surfaces, source.bindings, { points: asked, answers, count: points.length });
     surfaces.end();
     encoder.copyBufferToBuffer(kept, 0, order[0], 0, kept.size);
-    device.queue.submit([encoder.finish()]);
-    const [found] = await readBack(device, [{ buffer: answers }]);
+    const [found] = await readBack(device, [{ buffer: answers }], encoder);
     return readAnswers(new Float32Array(found), points.length);
   } finally {
     memory.destroy();

@@ -14,7 +14,7 @@ export { StreamedGaussians, type PoolOptions, type StreamOptions } from './strea
 export type { FetchPage, PageSource, StreamedScene } from './streaming/page-source.js';
 export { checkManifest, type DetailManifest } from './streaming/manifest.js';
 export { packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
-export type { AccumulationFormat, AuxiliaryOutputs, AuxiliaryFrame, RasterizerName } from './rasterizers/rasterizer.js';
+export type { AccumulationFormat, AuxiliaryFrame, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelImage } from './pictures/filtered-frame.js';
 export { ImageTensor, type ImageFit, type ImageShape } from './pictures/picture-tensor.js';
 export {

@@ -88,6 +88,6 @@ function overBudget(label: string, bytes: number, most: string): GaussianSplatEr
     expected: `at most ${most}`,
     found: inBytes(bytes),
     remedy:
-      'show a smaller scene (gaussian-splat economise makes one), remove other scenes, or raise the budget (memoryBudget, MemoryLedger.budgetBytes) if the device is known to have the memory',
+      'show a smaller scene (gaussian-splat economise makes one), remove others, or raise the budget (memoryBudget)',
   });
 }

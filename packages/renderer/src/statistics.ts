@@ -28,20 +28,6 @@ export interface Counters {
   readonly chunkShares: GPUBuffer;
 }
 
-/** Copies `visible` and `overflow` of the splats, and of the pairs where there are any, four words, into a buffer. */
-export function copyCounts(
-  encoder: GPUCommandEncoder,
-  plan: GPUBuffer,
-  pairPlan: GPUBuffer | undefined,
-  target: GPUBuffer,
-  offset: number,
-): void {
-  const { visible, overflow } = layouts.Plan.fields;
-  if (overflow.offset !== visible.offset + 4) throw new Error('Plan: overflow must follow visible');
-  encoder.copyBufferToBuffer(plan, visible.offset, target, offset, 8);
-  if (pairPlan) encoder.copyBufferToBuffer(pairPlan, visible.offset, target, offset + 8, 8);
-}
-
 /** Reads the counts back. */
 export async function readStatistics(device: GPUDevice, counters: Counters): Promise<FrameStatistics> {
   const { visible, overflow } = layouts.Plan.fields;

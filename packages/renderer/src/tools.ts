@@ -14,6 +14,7 @@ export { packFiller, packLevelGeometry, packLevelSh } from './levels/pack-level.
 export { chunksOf, emptyLevel, FACTOR_NUMBERS, leafLevel, shNumbers, type SplatLevel } from './levels/splat-level.js';
 export { CHUNK_NUMBERS } from './pack/chunks.js';
 export { isOfPlanes, sampleAxis } from './pack/morton.js';
+export { AuxiliaryOutputs } from './rasterizers/auxiliary-outputs.js';
 export { packedOrder } from './pack/pack.js';
 export { recentred } from './pack/recentre.js';
 export { choosePrecision, noiseIn, SCALE_BIAS, SCALE_STEPS, type ShPrecision } from './pack/sh.js';

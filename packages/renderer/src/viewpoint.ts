@@ -15,13 +15,19 @@ import { completed, type RenderSettings } from './render-settings.js';
 import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
-import type { AuxiliaryFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
-import { AuxiliaryPainter } from './rasterizers/tile-painter.js';
+import type {
+  AuxiliaryFrame,
+  AuxiliaryTilePainter,
+  Painting,
+  Rasterizer,
+  RasterizerName,
+} from './rasterizers/rasterizer.js';
 import { TilesRasterizer } from './rasterizers/tiles.js';
 import { requireBlendable, requireTextureSize } from './requirements.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
-import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
+import { copyCounts } from './copy-counts.js';
+import type { FrameStatistics } from './statistics.js';
 import { settle, variantsOf, type Variants } from './variants.js';
 import { scaled } from './view.js';
 import type { World } from './world.js';
@@ -105,7 +111,7 @@ export class UncheckedViewpoint {
   readonly #accumulations = new Map<string, Accumulation>();
   #mostSizes = 1;
   /** Of the last frame with auxiliary outputs. */
-  #auxiliary: AuxiliaryPainter | undefined;
+  #auxiliary: AuxiliaryTilePainter | undefined;
   /** Whether the last frame had to do without the code for its order. */
   #lacksOrder = false;
   /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
@@ -298,6 +304,7 @@ export class UncheckedViewpoint {
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
   async statistics(): Promise<FrameStatistics> {
+    const { readStatistics } = await loadModule('the code for counts', () => import('./statistics.js'));
     const resources = this.#engine.resources.current;
     if (resources === undefined)
       return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
@@ -418,7 +425,7 @@ export class UncheckedViewpoint {
     if (order) return { painter: order.painter(levers, camera, scratch, depth) };
     if (depth) return { depth, depths: scratch.depths, painter: depth.painter(scratch.depths) };
     if (!auxiliary) return {};
-    const painter = new AuxiliaryPainter(this.#device, auxiliary, scratch.survivors);
+    const painter = auxiliary.painter(this.#device, scratch.survivors);
     this.#auxiliary = painter;
     return { painter };
   }

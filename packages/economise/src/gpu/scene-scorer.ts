@@ -11,7 +11,7 @@ import {
   type StructLayout,
   type StructValues,
 } from '@gaussian-splat/renderer/stages';
-import { untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
+import { AuxiliaryOutputs, untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
 import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
 import { MIN_LOOKS, PRIOR_VIEWS, UNSEEN_CONTRAST } from '../score.js';
 import { layouts, NO_VIEW } from './layouts.js';
@@ -96,7 +96,7 @@ export class SceneScorer {
   /** Draws a view and notes the largest weights in it. */
   #paint(camera: Camera): void {
     const target = this.#targetOf(camera);
-    const auxiliary = { contributions: this.#peaks };
+    const auxiliary = new AuxiliaryOutputs({ contributions: this.#peaks });
     this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, auxiliary });
   }
 

@@ -8,6 +8,7 @@ import {
   rareKernelOf,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
+import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 import {
   PATCH,
   REFINE_GROUP,
@@ -22,6 +23,8 @@ import type { PictureErrors } from '../gpu/picture-errors.js';
 import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';
 
+/** Nothing besides the image: what a frame was painted from is enough. */
+const AUXILIARY = new AuxiliaryOutputs();
 /** Bindings begin at multiples of 256 bytes. */
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 const SMALL_STRIDE = 256;
@@ -119,7 +122,7 @@ export class SceneFitter {
   look(view: number): void {
     const { camera, reference } = this.#errors.exhibits[view];
     const image = this.#errors.targetOf(camera);
-    this.#renderer.render({ gaussians: this.#scene, camera, target: image, auxiliary: {} });
+    this.#renderer.render({ gaussians: this.#scene, camera, target: image, auxiliary: AUXILIARY });
     const noted = this.#renderer.auxiliary;
     if (noted === undefined) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.look' });

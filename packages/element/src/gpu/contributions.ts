@@ -1,7 +1,7 @@
 /** Loaded only when a page asks what its splats contribute. */
 import type { Camera, SplatFilter } from '@gaussian-splat/core';
 import type { FrameSettings, World } from '@gaussian-splat/renderer';
-import { readBackWith, UncheckedViewpoint, untilItHasRoom } from '@gaussian-splat/renderer/tools';
+import { AuxiliaryOutputs, readBackWith, UncheckedViewpoint, untilItHasRoom } from '@gaussian-splat/renderer/tools';
 import type { ReadCounts } from './painter.js';
 
 /** What is counted of: a viewport. */
@@ -44,6 +44,7 @@ async function countContributing({ device, view }: Counted, camera: Camera): Pro
     settings: { ...settings, rasterizer: 'tiles', order: 'center' },
   });
   const contributions = device.createBuffer({ label: 'gs.contributions', size, usage: STORAGE | COPY_SRC });
+  const auxiliary = new AuxiliaryOutputs({ contributions });
   const target = device.createTexture({
     size: [camera.width, camera.height],
     format: 'rgba16float',
@@ -51,7 +52,7 @@ async function countContributing({ device, view }: Counted, camera: Camera): Pro
   });
   try {
     await untilItHasRoom(() => {
-      viewpoint.draw(camera, { target, filter, auxiliary: { contributions } });
+      viewpoint.draw(camera, { target, filter, auxiliary });
       return viewpoint.isComplete();
     });
     const [counted] = await readBackWith(device, [{ buffer: contributions }], (weights) =>

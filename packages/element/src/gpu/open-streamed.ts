@@ -1,5 +1,5 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
-import { partRequest } from '@gaussian-splat/core';
+import { partRequest } from '@gaussian-splat/core/fetch';
 import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';

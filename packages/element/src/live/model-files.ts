@@ -1,5 +1,6 @@
 /** The files of models: their headers, which a worker reads, and what lies beside them. */
-import { bytesOf, fetchPatiently, GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import type { ModelPlace, OpenedModel } from '@gaussian-splat/core/onnx';
 import type { ModelSource } from '@gaussian-splat/generator';
 import type { SceneLimits } from '../loading/protocol.js';

@@ -1,5 +1,6 @@
 /** Loaded only when a sequence is shown. */
-import { partRequest, type Bounds } from '@gaussian-splat/core';
+import { type Bounds } from '@gaussian-splat/core';
+import { partRequest } from '@gaussian-splat/core/fetch';
 import { frameAt, framePath, movedFrame, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';

@@ -50,7 +50,7 @@ export function limitOverdraw(cloud: GaussianCloud, bounds: Bounds): Overdraw {
   if (frames <= allowed) return { warnings: cloud.warnings };
   const pixelShare = allowed / frames;
   const sentence =
-    `Its splats cover a frame ${Math.round(frames)} times, where ${Math.round(allowed)} are allowed for ${count} splats: ` +
-    `each side is drawn with ${(100 * pixelShare).toPrecision(2)} % of its pixels.`;
+    `Its splats cover a frame ${Math.round(frames)} times (${Math.round(allowed)} allowed): ` +
+    `each side has ${(100 * pixelShare).toPrecision(2)} % of its pixels.`;
   return { pixelShare, warnings: [...warnings, sentence] };
 }

@@ -1,5 +1,6 @@
 /** Loaded by the worker when the first mesh is asked for. */
-import { GaussianSplatError, partRequest } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { partRequest } from '@gaussian-splat/core/fetch';
 import { fetchScene, LoadBudget, readTriangles, type ImageFile, type TriangleFile } from '@gaussian-splat/formats';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';

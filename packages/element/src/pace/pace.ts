@@ -75,8 +75,12 @@ function observe(pace: Pace, { now, level, milliseconds }: FrameSample, { target
   return { ...pace, recent, movedAt, sampledAt: now, load, measured, believed };
 }
 
-/** What frames usually take, ms. */
-const usualOf = (recent: readonly number[]): number => quantile(recent, 0.5);
+/** Usual time of a frame, ms: the mean of the middle half. The answers for two frames that wait for one another may arrive together, so a median would alternate. */
+function usualOf(recent: readonly number[]): number {
+  const cut = recent.length >> 2;
+  const middle = [...recent].sort((x, y) => x - y).slice(cut, recent.length - cut);
+  return middle.reduce((sum, time) => sum + time, 0) / middle.length;
+}
 
 /** The next level, or null where it stays. */
 function choose(pace: Pace, now: number, rules: PaceRules): Pace | null {

@@ -1,4 +1,4 @@
-import { bytesOf, fetchPatiently } from '@gaussian-splat/core';
+import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import { css, html, nothing, render, type ReactiveController, type ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import { adoptStyles } from '../styles.js';

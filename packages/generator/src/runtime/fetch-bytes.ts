@@ -1,4 +1,5 @@
-import { bytesOf, chunksOf, fetchPatiently, GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { bytesOf, chunksOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 
 /** Hears how many bytes have arrived, and of how many; undefined while that is not known. */
 export type ProgressListener = (loaded: number, total: number | undefined) => void;

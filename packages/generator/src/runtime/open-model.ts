@@ -1,4 +1,5 @@
-import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { partUrl } from '@gaussian-splat/core/fetch';
 import {
   carriesContract,
   checkContract,

@@ -2,8 +2,7 @@ import { loadModule } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
 import { keyFor, pageStore, readChoice, writeChoice, type AutotuneStore } from './kept-choice.js';
-import { packSpheres, sphereCloud } from './known-answer.js';
-import { ANSWER_TARGET, FrameClock, isRight, timeFrames, type Trial } from './trials.js';
+import type * as trials from './trials.js';
 import type { RendererOptions } from '../frame-request.js';
 import { Renderer } from '../renderer.js';
 
@@ -42,9 +41,10 @@ const choiceOf = (device: GPUDevice): Choice => perDevice(device, 'choice', () =
 /** GPUMapMode.READ, which Node has only where Dawn was loaded. */
 const MAP_READ = 1;
 
-/** The smallest scene of the trials. */
-const SMALL: Trial = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 'int8'), width: 320, height: 180 };
 const QUICK_MS = 8;
+
+/** The self-test, which comes while the bytes of a scene are on their way. */
+const loadTrials = (): Promise<typeof trials> => loadModule('the self-test of the GPU', () => import('./trials.js'));
 
 /**
  * Finds variants with which a first frame can be drawn soon, once for each device: those that an earlier visit chose; else what is likely to suit a
@@ -60,17 +60,11 @@ export function startVariants(device: GPUDevice, options: StartOptions = {}): Pr
 async function start(device: GPUDevice, options: StartOptions, choice: Choice): Promise<Variants> {
   const { store = pageStore(), quickMs = QUICK_MS, format } = options;
   const isOpen = !device.adapterInfo?.isFallbackAdapter && readChoice(store, device) === undefined;
-  const isGood = isOpen && (await measured('start', () => isGoodStart(device, quickMs, format)));
+  const isGood =
+    isOpen && (await measured('start', async () => (await loadTrials()).isGoodStart(device, LIKELY, quickMs, format)));
   if (!isGood) return autotune(device, options);
   if (!choice.chosen) remember(device, LIKELY);
   return LIKELY;
-}
-
-async function isGoodStart(device: GPUDevice, quickMs: number, format?: GPUTextureFormat): Promise<boolean> {
-  if (!(await isRight(device, LIKELY, format))) return false;
-  const clock = await FrameClock.on(device);
-  // Into what the known answer was drawn into: nothing is compiled for this trial alone.
-  return (await timeFrames(device, LIKELY, SMALL, clock, ANSWER_TARGET)) <= quickMs;
 }
 
 /**
@@ -86,7 +80,10 @@ export function autotune(device: GPUDevice, options: AutotuneOptions = {}): Prom
 async function choose(device: GPUDevice, options: AutotuneOptions): Promise<Variants> {
   const { store = pageStore(), pause = noPause, format } = options;
   const kept = readChoice(store, device);
-  const variants = kept !== undefined && (await isRight(device, kept, format)) ? kept : await search(device, pause);
+  const variants =
+    kept !== undefined && (await (await loadTrials()).isRight(device, kept, format))
+      ? kept
+      : await search(device, pause);
   // What a device answered while it was lost says nothing about the adapter, whose other devices would go by it.
   if (!(await isAlive(device))) return SAFE;
   remember(device, variants);

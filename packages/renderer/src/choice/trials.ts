@@ -6,7 +6,7 @@ import { UncheckedViewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import type { Variants } from '../variants.js';
-import { givesKnownAnswer, probeCamera, viewpointOf } from './known-answer.js';
+import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
 
 /** Frames of a trial. */
 export const FRAMES = 4;
@@ -50,6 +50,22 @@ const PAGE_TARGET = {
   format: 'rgba8unorm',
   usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.storageBinding,
 } as const;
+
+/** The smallest scene of the trials. */
+const SMALL: Trial = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 'int8'), width: 320, height: 180 };
+
+/** Whether a variant passes the self-test and draws a small frame within some milliseconds. */
+export async function isGoodStart(
+  device: GPUDevice,
+  variants: Variants,
+  quickMs: number,
+  format?: GPUTextureFormat,
+): Promise<boolean> {
+  if (!(await isRight(device, variants, format))) return false;
+  const clock = await FrameClock.on(device);
+  // Into what the known answer was drawn into: nothing is compiled for this trial alone.
+  return (await timeFrames(device, variants, SMALL, clock, ANSWER_TARGET)) <= quickMs;
+}
 
 /** Milliseconds of each of a few frames in a row. */
 export async function timeFrames(

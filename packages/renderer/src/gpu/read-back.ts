@@ -8,9 +8,16 @@ export interface ReadPart {
   readonly byteLength?: number;
 }
 
-/** Reads buffers back, in one submission. Rejects if the device is lost meanwhile. */
-export async function readBack(device: GPUDevice, parts: readonly ReadPart[]): Promise<ArrayBuffer[]> {
-  return readBackWith(device, parts, (mapped) => mapped.slice(0));
+/**
+ * Reads buffers back, in one submission. Rejects if the device is lost meanwhile.
+ * @param encoder has recorded what writes the buffers; default: a new one
+ */
+export async function readBack(
+  device: GPUDevice,
+  parts: readonly ReadPart[],
+  encoder?: GPUCommandEncoder,
+): Promise<ArrayBuffer[]> {
+  return readBackWith(device, parts, (mapped) => mapped.slice(0), encoder);
 }
 
 /**
@@ -21,9 +28,9 @@ export async function readBackWith<Taken>(
   device: GPUDevice,
   parts: readonly ReadPart[],
   take: (mapped: ArrayBuffer) => Taken,
+  encoder = device.createCommandEncoder({ label: 'gs.read_back' }),
 ): Promise<Taken[]> {
   const { mapRead, copyDestination } = BUFFER_USAGE;
-  const encoder = device.createCommandEncoder({ label: 'gs.read_back' });
   const staged = parts.map(({ buffer, byteOffset = 0, byteLength = buffer.size }) => {
     const staging = device.createBuffer({
       label: 'gs.read_back',

@@ -39,7 +39,7 @@ export interface Surface {
 }
 
 /** What a frame tells about itself on the way, besides its image. */
-export interface AuxiliaryOutputs {
+export interface AuxiliaryTargets {
   /**
    * One word for each splat, in the order of `packedOrder`, pages filled up to whole chunks of 256: the bits of the largest weight, alpha times
    * transmittance, that the splat has had in any pixel. Weights of earlier frames stay where they are larger: clear the buffer for those
@@ -51,6 +51,17 @@ export interface AuxiliaryOutputs {
    * A texture of the target's size, format `r32float`, usage STORAGE_BINDING.
    */
   readonly depth?: GPUTexture;
+}
+
+/** What writes auxiliary outputs: the class of this name in `@gaussian-splat/renderer/tools`. */
+export interface AuxiliaryOutputs {
+  /** @param survivors numbers of the visible splats by slot */
+  painter(device: GPUDevice, survivors: GPUBuffer): AuxiliaryTilePainter;
+}
+
+export interface AuxiliaryTilePainter extends TilePainter {
+  /** What the frame was painted from; undefined before it is recorded. */
+  readonly frame: AuxiliaryFrame | undefined;
 }
 
 /** What a frame with auxiliary outputs was painted from, for passes that go over it again. All of it is the renderer's: to be read before the next frame. */
@@ -65,7 +76,7 @@ export interface AuxiliaryFrame {
   readonly tile_bits: GPUBuffer;
   /** array<vec2u>: of each bin the first pair, and the one behind the last. */
   readonly ranges: GPUBuffer;
-  /** Numbers of the splats by slot, as {@link AuxiliaryOutputs.contributions} counts them. */
+  /** Numbers of the splats by slot, as {@link AuxiliaryTargets.contributions} counts them. */
   readonly survivors: GPUBuffer;
 }
 

@@ -1,0 +1,71 @@
+/** Painting tiles with auxiliary outputs. */
+import { rasterizeTilesAuxiliary } from '../generated/auxiliary-shaders.js';
+import { constants } from '../generated/shaders.js';
+import { BUFFER_USAGE, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
+import type {
+  AuxiliaryFrame,
+  AuxiliaryOutputs as AuxiliaryOutputsOf,
+  AuxiliaryTargets,
+  AuxiliaryTilePainter,
+} from './rasterizer.js';
+import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
+import { BoundImages } from './tile-painter.js';
+
+/** Auxiliary outputs of a frame: see {@link AuxiliaryTargets}. Few pages ask for any, so the code comes with this class. */
+export class AuxiliaryOutputs implements AuxiliaryOutputsOf {
+  readonly #targets: AuxiliaryTargets;
+
+  constructor(targets: AuxiliaryTargets = {}) {
+    this.#targets = targets;
+  }
+
+  painter(device: GPUDevice, survivors: GPUBuffer): AuxiliaryTilePainter {
+    return new AuxiliaryPainter(device, this.#targets, survivors);
+  }
+}
+
+/** Writes auxiliary outputs besides. */
+class AuxiliaryPainter implements AuxiliaryTilePainter {
+  readonly tile = constants.TILE;
+  readonly #device: GPUDevice;
+  readonly #outputs: AuxiliaryTargets;
+  readonly #survivors: GPUBuffer;
+  #frame: AuxiliaryFrame | undefined;
+
+  /** @param survivors numbers of the visible splats by slot */
+  constructor(device: GPUDevice, outputs: AuxiliaryTargets, survivors: GPUBuffer) {
+    this.#device = device;
+    this.#outputs = outputs;
+    this.#survivors = survivors;
+  }
+
+  /** What the frame was painted from; undefined before it is recorded. */
+  get frame(): AuxiliaryFrame | undefined {
+    return this.#frame;
+  }
+
+  kernel(variant: RasterizeVariant): RasterizeKernel {
+    return rasterizeKernel(this.#device, rasterizeTilesAuxiliary, variant);
+  }
+
+  /** Bound anew for each frame: few frames have auxiliary outputs. */
+  bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup {
+    const unused = unusedOutputs(this.#device);
+    const { contributions = unused.contributions, depth = unused.depth } = this.#outputs;
+    this.#frame = { ...(painted as PaintedTiles & AuxiliaryFrame), survivors: this.#survivors };
+    return new BoundImages().bind(kernel, painted, {
+      ...{ survivors: this.#survivors, contributions },
+      depths: depth.createView(),
+    });
+  }
+}
+
+/** Where auxiliary outputs go that no caller asked for. */
+const unusedOutputs = (device: GPUDevice): Required<AuxiliaryTargets> =>
+  perDevice(device, 'unused outputs', () => ({
+    contributions: device.createBuffer({ label: 'gs.no_contributions', size: 4, usage: BUFFER_USAGE.storage }),
+    depth: device.createTexture({
+      ...{ label: 'gs.no_depth', size: [1, 1], format: 'r32float' as const },
+      usage: TEXTURE_USAGE.storageBinding,
+    }),
+  }));
