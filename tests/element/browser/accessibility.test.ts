@@ -23,7 +23,10 @@ describe('axe finds nothing in the element', () => {
     application.append(hotspot('north'), hotspot('south'));
     await showLoaded({ alt: '' });
     const turning = await showLoaded({ alt: 'On a turntable', 'auto-rotate': '', 'auto-rotate-delay': '60000' });
-    await until(() => turning.shadowRoot?.querySelector('[part=pause-button]') instanceof Element, 'a button that stops it');
+    await until(
+      () => turning.shadowRoot?.querySelector('[part=pause-button]') instanceof Element,
+      'a button that stops it',
+    );
     await until(() => application.shadowRoot?.querySelector('[part=prompt]') !== null, 'the prompt');
     assertEqual(await violations(document, ELEMENT_ONLY), []);
   });
