@@ -54,7 +54,7 @@ describe('code that cannot be loaded when it is needed', () => {
   });
 
   it('in the worker: what knows files that are no scene', async () => {
-    await assertLost('/net/html', 'diagnose.js', /no scene/);
+    await assertLost('/net/html', 'diagnose.js', /code for other files/);
   });
 
   it("on the page's thread: the reader of a format, and another format is read", async () => {
