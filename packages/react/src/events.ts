@@ -11,6 +11,7 @@ const EVENTS = {
   onPosterDismissed: 'poster-dismissed',
   onInputsChange: 'inputs-change',
   onViewChange: 'view-change',
+  onWalkReady: 'walk-ready',
   onModelVisibility: 'model-visibility',
   onGeneratorError: 'generator-error',
   onGeneratorFallback: 'generator-fallback',

@@ -60,7 +60,7 @@ describe('the page of the checker', () => {
     const page = await openPage();
     const inferred = await drop(page, await fixture('canonical.onnx'));
     assert(inferred.text.includes('inferred from names'), inferred.text);
-    assertEqual((await drop(page, await fixture('subgraphs.onnx'))).verdict, 'subgraphs.onnx: 5 faults');
+    assertEqual((await drop(page, await fixture('subgraphs.onnx'))).verdict, 'subgraphs.onnx: 6 faults');
     const external = await fixture('external.onnx');
     assertEqual((await drop(page, external)).verdict, 'external.onnx keeps the contract.');
     const short = new File(['too short'], 'external.weights');

@@ -37,7 +37,7 @@ export const composed = (
       rotation="0 90deg 0"
       matrix={new DOMMatrix()}
       crop={[0, 0, 0, 1, 1, 1]}
-      controls={{ smile: 1 }}
+      inputValues={{ smile: 1 }}
       hidden
       onError={({ detail }) => console.log(detail.reason)}
     />
