@@ -20,7 +20,10 @@ export function scriptSizes() {
   });
 }
 
-/** Paths of what a page fetches to show a PLY scene: element, worker, PLY reader, and what these import. */
+/**
+ * Paths of what a page fetches to show a PLY scene: element, worker, PLY reader, and what these import. Parts that the element fetches later are not counted: the
+ * self-test of the GPU, beside the scene, and printing, after the first frame.
+ */
 export function scriptsForPly() {
   const reader = readdirSync(join(CDN, 'readers')).find((file) => /^ply-[^.]+\.js$/.test(file));
   if (reader === undefined) throw new Error(`no PLY reader found in ${CDN}readers`);

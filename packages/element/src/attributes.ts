@@ -265,7 +265,7 @@ export const ATTRIBUTES = {
    */
   eyeHeight: read(lengthGrammar('1.6m')),
   /**
-   * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking takes a unit for one meter, and measured lengths have no unit.
+   * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking takes a unit for one meter.
    * @default unknown
    * @example unit="37cm"
    */

@@ -1,3 +1,4 @@
+import { concatenated } from '../concatenated.js';
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { MOTION_MODES, MOTION_VERSION, MOVING, MOVING_NAMES, type MovingName } from '@gaussian-splat/formats';
 import type { Deflate } from '../pages/page-planes.js';
@@ -54,8 +55,8 @@ export function writeMotion(
   parts.flatMap((part) => [...part.curves]).forEach((value, k) => curves.setFloat32(4 * k, value, true));
   const planes = parts.flatMap(({ codes }) => codes.map((own) => smaller(own, deflate)));
   const modes = Uint8Array.from(planes, ({ mode }) => mode);
-  const begin = joined([bytesOf(head), bytesOf(curves), modes]);
-  return joined([deflate(begin), ...planes.map(({ bytes }) => bytes), END]);
+  const begin = concatenated([bytesOf(head), bytesOf(curves), modes]);
+  return concatenated([deflate(begin), ...planes.map(({ bytes }) => bytes), END]);
 }
 
 /** [width · splats, frames] what each number differs by from the first frame; undefined where all are as they were. */
@@ -166,7 +167,7 @@ function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: 
       planes[i] = folded & 255;
       planes[own.length + i] = (folded >> 8) & 255;
     });
-    return joined([deflate(planes.subarray(0, own.length)), deflate(planes.subarray(own.length))]);
+    return concatenated([deflate(planes.subarray(0, own.length)), deflate(planes.subarray(own.length))]);
   });
   return plain.length <= changed.length
     ? { mode: MOTION_MODES.plain, bytes: plain }
@@ -174,16 +175,6 @@ function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: 
 }
 
 const bytesOf = ({ buffer }: DataView): Uint8Array => new Uint8Array(buffer);
-
-function joined(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
-  const all = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const piece of pieces) {
-    all.set(piece, at);
-    at += piece.length;
-  }
-  return all;
-}
 
 const notCorresponding = (expected: number, found: number): GaussianSplatError =>
   new GaussianSplatError('argument/value', {

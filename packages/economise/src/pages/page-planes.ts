@@ -1,3 +1,4 @@
+import { concatenated } from '../concatenated.js';
 import { DIFFERENCES, headBytes, PLAIN, PLANES, planesOf, type SplatLevel } from '@gaussian-splat/renderer/tools';
 
 /** What compresses bytes to a piece of a raw deflate stream that others are put behind: it ends with a sync flush. */
@@ -106,14 +107,4 @@ class Runs {
   get pieces(): Uint8Array[] {
     return this.#runs.map(({ deflated }) => deflated);
   }
-}
-
-function concatenated(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
-  const all = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
-  let at = 0;
-  for (const piece of pieces) {
-    all.set(piece, at);
-    at += piece.length;
-  }
-  return all;
 }

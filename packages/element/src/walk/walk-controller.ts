@@ -90,11 +90,6 @@ export class WalkController implements ReactiveController, Mover {
     return this.#of.attributes.navigation === 'walk' && !this.#isRefused ? this.#word('keys-walk') : undefined;
   }
 
-  /** Area of the floor, m²; undefined before it is known. */
-  get area(): number | undefined {
-    return this.#walker?.map.area;
-  }
-
   hostUpdated(): void {
     const { attributes, surface } = this.#of;
     if (attributes.navigation !== 'walk' || surface === null || !surface.isConnected) return this.#stop();

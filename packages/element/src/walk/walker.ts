@@ -65,15 +65,6 @@ export class Walker {
     this.#eyeFloor = this.#at[1];
   }
 
-  /** Teleports to a place on the floor. @returns false if there is none */
-  teleport(to: Vector3): boolean {
-    const height = floorAt(this.map, to[0], to[2], to[1]);
-    if (height === undefined) return false;
-    this.#at = [to[0], height, to[2]];
-    this.jump();
-    return true;
-  }
-
   /**
    * Walks for some time.
    * @param x direction in viewer space; 0 and 0 follow the path, lengths above 1 count as 1
