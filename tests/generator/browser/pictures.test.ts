@@ -5,6 +5,7 @@ import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import {
   calls,
   codeOf,
+  dispatches,
   FIXTURES,
   makeDevice,
   numbersOf,
@@ -249,6 +250,29 @@ describe('Gaussians made of a picture', () => {
     await ask();
     const white = numbersOf(await sink.runs[1].tensors.gaussians, 'float32');
     assertEqual([white[9], white[10], white[11]], [1, 1, 1], 'white');
+    generator.close();
+    tensor.destroy();
+  });
+
+  it('take one run for the first image and one for each other: no run proves a recording', async () => {
+    const generator = await Generator.open({ url: `${FIXTURES}picture.onnx` }, device, {
+      onError: reportError,
+      compare: false,
+    });
+    const sink = (generator.sink = new ReadingSink(device));
+    const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    const counts: number[] = [];
+    for (const grey of [255, 51, 0]) {
+      tensor.upload(await plainPicture(grey));
+      const before = dispatches.count;
+      generator.request({ pictures: { image: tensor } });
+      await generator.idle;
+      counts.push(dispatches.count - before);
+    }
+    assertEqual([generator.kind, sink.runs.length], ['webgpu', 3], 'kind, runs');
+    const [first, second, third] = counts;
+    assert(second > 0 && second === third, `dispatches of later runs: ${second}, ${third}`);
+    assert(first <= 1.3 * second, `${first} dispatches until the first frame, of ${second} in a run`);
     generator.close();
     tensor.destroy();
   });

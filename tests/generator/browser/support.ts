@@ -152,6 +152,14 @@ for (const name of COUNTED) {
     },
   });
 }
+/** Compute dispatches since the page was opened. */
+export const dispatches = { count: 0 };
+
+const { dispatchWorkgroups } = GPUComputePassEncoder.prototype;
+GPUComputePassEncoder.prototype.dispatchWorkgroups = function countingDispatches(this: GPUComputePassEncoder, ...size) {
+  dispatches.count++;
+  return dispatchWorkgroups.apply(this, size);
+};
 const mapAsync = GPUBuffer.prototype.mapAsync;
 GPUBuffer.prototype.mapAsync = function countingMapAsync(this: GPUBuffer, ...rest) {
   calls.mapAsync++;

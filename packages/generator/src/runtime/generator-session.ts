@@ -107,7 +107,8 @@ export class GeneratorSession {
   }
 
   /**
-   * Runs the model; the first run also starts the session. `use` must submit its work before it returns.
+   * Runs the model; the first run also starts the session, and `use` gets its outputs before recording begins. `use` must submit its work before it
+   * returns.
    * @throws ContractError `contract/run` if the runtime fails; GaussianSplatError `device-lost/unrecoverable` if the device is lost,
    * `network/*` if the runtime cannot be fetched; what `use` throws.
    */
@@ -129,14 +130,17 @@ export class GeneratorSession {
 
   async #runOnce(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     await this.#rest();
-    const starting = (this.#live ??= this.#start(inputs));
+    const first = new FirstUse((outputs) => {
+      // A lost device writes nothing, and the runtime does not notice.
+      this.#requireLife();
+      use(outputs);
+    });
+    const starting = (this.#live ??= this.#start(inputs, first.take));
     const live = await this.#started(starting);
     try {
-      await live.run(inputs, (outputs) => {
-        // A lost device writes nothing, and the runtime does not notice.
-        this.#requireLife();
-        use(outputs);
-      });
+      // The run that started the session has answered this request.
+      if (first.isTaken) first.requireSuccess();
+      else await live.run(inputs, first.use);
       this.#failures = 0;
       this.#hasRun = true;
       this.#hasBroken = false;
@@ -184,7 +188,7 @@ export class GeneratorSession {
     );
   }
 
-  async #start(inputs: Inputs): Promise<LiveSession> {
+  async #start(inputs: Inputs, onFirstRun: (outputs: RunOutputs) => void): Promise<LiveSession> {
     const { model, device } = this;
     const requireLife = (): void => this.#requireLife();
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
@@ -199,6 +203,7 @@ export class GeneratorSession {
       onFallback,
       refusal: this.#refusal,
       keepsEvidence: this.#compare !== false && this.#verdict === undefined,
+      onFirstRun,
     });
     this.#kind = session.kind;
     if (evidence) void this.#prove(evidence);
@@ -242,6 +247,34 @@ export class GeneratorSession {
   #requireLife(): void {
     if (this.#isLost) throw deviceLost(undefined);
     if (this.#isReleased) throw new DOMException('The generator was closed', 'AbortError');
+  }
+}
+
+/** Takes the outputs of the run that starts a session. What it throws must not count as a fault of that run. */
+class FirstUse {
+  readonly use: (outputs: RunOutputs) => void;
+  #taken: { readonly error?: unknown } | undefined;
+
+  constructor(use: (outputs: RunOutputs) => void) {
+    this.use = use;
+  }
+
+  get isTaken(): boolean {
+    return this.#taken !== undefined;
+  }
+
+  readonly take = (outputs: RunOutputs): void => {
+    this.#taken = {};
+    try {
+      this.use(outputs);
+    } catch (error) {
+      this.#taken = { error };
+    }
+  };
+
+  /** @throws what `use` threw */
+  requireSuccess(): void {
+    if (this.#taken && 'error' in this.#taken) throw this.#taken.error;
   }
 }
 

@@ -23,6 +23,11 @@ export interface StartOptions {
   readonly refusal?: string;
   /** Whether what the first run wrote on the GPU is to be kept for a comparison. */
   readonly keepsEvidence?: boolean;
+  /**
+   * Takes the outputs of the first run: they answer the request that starts the session, before any run that serves the recording. It must submit its work
+   * before it returns, and must not throw. It is called again only if a later start replaces the first one.
+   */
+  readonly onFirstRun?: (outputs: RunOutputs) => void;
 }
 
 /** A session that has run, and what its first run on the GPU wrote, if that is to be compared. */
@@ -51,10 +56,26 @@ export async function startSession(options: StartOptions): Promise<StartedSessio
     if (started) return started;
   }
   const reason = refusals.join('; ');
-  const started = await start('wasm', options, refusals);
+  const started = await start('wasm', options, refusals, (outputs) => {
+    // Who listens asks anew for what the GPU may have written wrongly: this run answers that.
+    onFallback(reason);
+    options.onFirstRun?.(outputs);
+  });
   if (started === undefined) throw new ContractError([runFault(model, refusals.join('; '))]);
-  onFallback(reason);
   return { session: started.session };
+}
+
+/**
+ * Inputs that change when a person chooses something else, never with a clock, a camera or another model.
+ */
+const CHOSEN: ReadonlySet<string> = new Set(['image', 'control', 'shape', 'seed']);
+
+/**
+ * A network that turns images into Gaussians runs once for each image. The proof of a recording takes four runs, which no later run earns back.
+ */
+function runsOncePerImage({ contract, layout }: GeneratorModel): boolean {
+  const roles = Object.values(contract.inputs).map(({ role }) => role);
+  return layout !== undefined && roles.includes('image') && roles.every((role) => CHOSEN.has(role));
 }
 
 /**
@@ -64,10 +85,11 @@ export async function startSession(options: StartOptions): Promise<StartedSessio
  */
 async function startOnGpu(options: StartOptions, refusals: string[]): Promise<StartedSession | undefined> {
   const { model, device, keepsEvidence } = options;
-  const isRecordable = canBeRecorded(model);
+  const isRecordable = canBeRecorded(model) && !runsOncePerImage(model);
   const constants = isRecordable ? constantOutputs(model.header) : new Set<string>();
   const fixed: FixedOutputs = {};
   const plain = await start('webgpu', options, refusals, (outputs) => {
+    options.onFirstRun?.(outputs);
     for (const { name } of model.outputs) if (constants.has(name)) fixed[name] = copyOf(device, name, outputs);
   });
   if (plain === undefined) return undefined;
