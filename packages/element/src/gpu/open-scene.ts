@@ -1,6 +1,6 @@
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { startVariants } from '@gaussian-splat/renderer';
-import type { LiveModel, LiveRequest } from '../live/live-model.js';
+import type { LiveRequest } from '../live/live-model.js';
 import type { FileRequest, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
@@ -120,35 +120,14 @@ async function openSequence(
   return scene;
 }
 
-/**
- * Share of the work before a generator's first frame that comes after its bytes: compiling the runtime, making a session, the first runs. How long that
- * takes is known to nobody beforehand; but a bar that is full must not stand still.
- */
-const WARM_UP = 0.25;
-
+/** Device and code at the same time. */
 async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
-  const opening = loadModule('the code that runs generators', () => import('../live/open-live-model.js'));
   const acquiring = options.device.acquire();
-  opening.catch(ignore);
-  const lease = await acquiring;
-  let live: LiveModel | undefined;
   try {
-    signal.throwIfAborted();
-    limitScenes(lease.device, memoryBudget);
-    const starting = startVariants(lease.device, pictures()).catch(unlessWrong);
-    starting.catch(ignore);
-    const { openLiveModel } = await opening;
-    live = await openLiveModel({ ...options.live(), ...request, memoryBudget }, lease.device, signal, (loaded, total) =>
-      onProgress(loaded, total, total && ((1 - WARM_UP) * loaded) / total),
-    );
-    await starting;
-    beforeUpload(live.gaussians.byteLength);
-    return new LoadedGaussians(lease, live.gaussians, live.bounds, submissions, { live });
+    const live = await loadModule('the code that runs generators', () => import('../live/open-live-model.js'));
+    return await live.openLiveScene(request, options, await acquiring);
   } catch (error) {
-    live?.close();
-    live?.gaussians.destroy();
-    lease.release();
+    acquiring.then((lease) => lease.release(), ignore);
     throw error;
   }
 }
@@ -192,10 +171,10 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
 }
 
 /** What the canvas is made of. */
-const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
+export const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
 
 /** That no variant draws the right image ends the loading; that none could be timed does not. */
-function unlessWrong(error: unknown): void {
+export function unlessWrong(error: unknown): void {
   if (error instanceof GaussianSplatError && error.code === 'unsupported/wrong-image') throw error;
 }
 

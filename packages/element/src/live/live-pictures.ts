@@ -57,6 +57,11 @@ export class LivePictures {
     return this.#loading.size > 0;
   }
 
+  /** True if every input has its pictures, and none is on its way. */
+  get areComplete(): boolean {
+    return !this.isLoading && [...this.#shapes.keys()].every((name) => name in this.#tensors);
+  }
+
   /** Fulfils, and never rejects, once nothing is on its way. */
   async settled(): Promise<void> {
     while (this.#loading.size > 0) await Promise.all(this.#loading);

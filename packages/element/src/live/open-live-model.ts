@@ -2,7 +2,12 @@
 import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
-import type { ProgressListener } from '../loading/protocol.js';
+import { startVariants } from '@gaussian-splat/renderer';
+import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import { limitScenes } from '../gpu/memory-budget.js';
+import { pictures as frames, unlessWrong, type OpenOptions } from '../gpu/open-scene.js';
+import type { DeviceLease } from '../gpu/shared-device.js';
+import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { inputsOf } from './inputs.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
@@ -10,6 +15,7 @@ import { fetchBeside, readsHeaders } from './model-files.js';
 import { compareOf, offerPanel } from './of-element.js';
 import { StateReader } from './read-state.js';
 import { RunWatch } from './run-watch.js';
+import { waitForImages, type WaitingPlace } from './wait-for-images.js';
 import type { Vector3 } from '@gaussian-splat/core';
 import type { Contract } from '@gaussian-splat/core/contract';
 import { parseUp } from '../camera/grammar.js';
@@ -34,12 +40,49 @@ export function declaredBounds(contract: Contract): SceneBounds | undefined {
 export const upOf = ({ coordinates }: Contract): Vector3 | undefined =>
   parseUp(coordinates?.up?.replace('+', '') ?? '') ?? undefined;
 
+/**
+ * Share of the work before a generator's first frame that comes after its bytes: compiling the runtime, making a session, the first runs. How long that
+ * takes is known to nobody beforehand; but a bar that is full must not stand still.
+ */
+const WARM_UP = 0.25;
+
+/** The scene of a generator. @param lease the caller releases it if this rejects */
+export async function openLiveScene(
+  request: SceneRequest,
+  options: OpenOptions,
+  lease: DeviceLease,
+): Promise<LoadedGaussians> {
+  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
+  let live: LiveModel | undefined;
+  try {
+    signal.throwIfAborted();
+    limitScenes(lease.device, memoryBudget);
+    const starting = startVariants(lease.device, frames()).catch(unlessWrong);
+    starting.catch(() => undefined);
+    live = await openLiveModel(
+      { ...options.live(), ...request, memoryBudget },
+      lease.device,
+      signal,
+      (loaded, total) => onProgress(loaded, total, total && ((1 - WARM_UP) * loaded) / total),
+      starting.then(() => options),
+    );
+    await starting;
+    beforeUpload(live.gaussians.byteLength);
+    return new LoadedGaussians(lease, live.gaussians, live.bounds, submissions, { live });
+  } catch (error) {
+    live?.close();
+    live?.gaussians.destroy();
+    throw error;
+  }
+}
+
 /** A generator, once its first run is in its Gaussians. Rejects with GaussianSplatError, or the signal's reason. */
-export async function openLiveModel(
+async function openLiveModel(
   request: LiveRequest,
   device: GPUDevice,
   signal: AbortSignal,
   onProgress: ProgressListener,
+  place: Promise<WaitingPlace>,
 ): Promise<LiveModel> {
   if (request.runtimeLocation !== null) setRuntimeLocation(new URL(request.runtimeLocation, document.baseURI));
   let firstFailure: unknown;
@@ -81,6 +124,9 @@ export async function openLiveModel(
     pictures.update(request.state().pictures);
     await pictures.settled();
     signal.throwIfAborted();
+    offerPanel(request.element);
+    if (!pictures.areComplete) await waitForImages(live, model, pictures, { request, signal, place: await place });
+    signal.throwIfAborted();
     live.request(request.state(), request.camera(declared));
     await generator.idle;
     signal.throwIfAborted();
@@ -88,7 +134,6 @@ export async function openLiveModel(
     let bounds = declared ?? (await live.readBounds!());
     signal.throwIfAborted();
     isOpen = true;
-    offerPanel(request.element);
     watch = new RunWatch(gaussians, model.header.name, onError, (now, isFirst) => {
       // The contract speaks of all times.
       if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };

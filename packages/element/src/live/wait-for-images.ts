@@ -1,0 +1,61 @@
+import type { GaussianModelFile } from '@gaussian-splat/generator';
+import { DynamicGaussians } from '@gaussian-splat/renderer';
+import type { SceneBounds } from '../camera/settings.js';
+import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { OpenOptions } from '../gpu/open-scene.js';
+import type { LiveRequest, Timeline } from './live-model.js';
+import type { LivePictures } from './live-pictures.js';
+
+/** Where a scene without splats is shown meanwhile. */
+export type WaitingPlace = Pick<OpenOptions, 'device' | 'onPreview' | 'submissions'>;
+
+/** Between two looks at the inputs of an element that draws nothing, ms. */
+const LOOK_MS = 250;
+
+/** Where nothing is known of the subject. */
+const UNIT_BALL: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
+
+/**
+ * Fulfils once all images that a generator takes have arrived. Meanwhile the element shows a scene without splats, so that the page and the panel of controls
+ * know the inputs.
+ * @throws the reason of the signal.
+ */
+export async function waitForImages(
+  { inputs, settable }: Pick<Timeline, 'inputs' | 'settable'>,
+  { layout }: Pick<GaussianModelFile, 'layout'>,
+  pictures: LivePictures,
+  { request, signal, place }: { request: LiveRequest; signal: AbortSignal; place: WaitingPlace },
+): Promise<void> {
+  await new Promise<void>((resolve, reject) => {
+    const look = (): void => {
+      pictures.update(request.state().pictures);
+      if (!pictures.areComplete) return;
+      clearInterval(timer);
+      resolve();
+    };
+    signal.addEventListener('abort', () => {
+      clearInterval(timer);
+      reject(signal.reason as Error);
+    });
+    // Every frame asks; an element out of sight draws none.
+    const timer = place.onPreview ? undefined : setInterval(look, LOOK_MS);
+    const waiting: Timeline = { duration: NaN, inputs, settable, request: look, close: () => undefined };
+    void showEmpty(place, layout, waiting).then(look, reject);
+  });
+}
+
+async function showEmpty(
+  { device, onPreview, submissions }: WaitingPlace,
+  layout: GaussianModelFile['layout'],
+  live: Timeline,
+): Promise<void> {
+  if (onPreview === undefined) return;
+  const lease = await device.acquire();
+  try {
+    const gaussians = await DynamicGaussians.create(lease.device, { ...layout, capacity: 1, paddedRows: undefined });
+    onPreview(new LoadedGaussians(lease, gaussians, UNIT_BALL, submissions, { live }));
+  } catch (error) {
+    lease.release();
+    throw error;
+  }
+}
