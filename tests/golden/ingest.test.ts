@@ -183,6 +183,28 @@ test('ingest: bounds come from what is drawn', async () => {
   gaussians.destroy();
 });
 
+test('ingest: rows that cannot be drawn are counted, rows without opacity and centers that meet are none of them', async () => {
+  const device = await serialDevice();
+  const { cloud } = smallRoom();
+  const written = writeTensors(cloud, { ...SPECS[0], dtype: 'float32' });
+  const gaussians = await DynamicGaussians.create(device, written.layout);
+  const sampleOf = async (change: (positions: Float32Array, opacities: Float32Array) => void) => {
+    const changed = { ...cloud, positions: cloud.positions.slice(), opacities: cloud.opacities.slice() };
+    change(changed.positions, changed.opacities);
+    gaussians.ingest(await uploadTensors(writeTensors(changed, { ...SPECS[0], dtype: 'float32' })), cloud.count);
+    const { drawn, unusable } = await gaussians.readSample();
+    assert.equal(gaussians.droppedCount, unusable);
+    return [drawn, unusable];
+  };
+  const { count } = cloud;
+  assert.deepEqual(await sampleOf((positions) => positions.fill(0)), [count, 0], 'all centers in the origin');
+  assert.deepEqual(await sampleOf((_, opacities) => opacities.fill(0)), [0, 0], 'no opacity');
+  const spoil = (positions: Float32Array): void => void positions.fill(NaN, 0, 7 * 3);
+  assert.deepEqual(await sampleOf(spoil), [count - 7, 7], 'seven rows');
+  assert.deepEqual(await sampleOf((positions) => positions.fill(NaN)), [0, count], 'all rows');
+  gaussians.destroy();
+});
+
 test('ingest: a tensor that is missing or too small, or too many rows, is refused and changes nothing', async () => {
   const device = await serialDevice();
   const { cloud } = smallRoom();

@@ -28,6 +28,16 @@ const ORIGIN: Vector3 = [0, 0, 0];
 /** Sets of tensors whose bindings are kept: a generator's outputs go around in few buffers. */
 const MAX_BINDINGS = 8;
 
+/** What a sample of the rows of a run shows. */
+export interface RowSample {
+  /** Of the rows with an opacity above 0. */
+  readonly bounds: Bounds;
+  /** Rows with an opacity above 0. */
+  readonly drawn: number;
+  /** Rows with numbers that cannot be drawn: not finite, beyond all bounds, no extent, or a rotation of zeros. */
+  readonly unusable: number;
+}
+
 /** A page with what only its filling needs. */
 interface DynamicPage extends GaussianPage {
   /** Number of its first row among all rows. */
@@ -67,6 +77,7 @@ export class DynamicGaussians implements GaussianScene {
   readonly #bindings = new Map<string, readonly GPUBindGroup[]>();
   #version = 0;
   #rows = -1;
+  #dropped = 0;
   /** Rows of other scenes before this one's that the places in the uniforms stand for. */
   #before = 0;
 
@@ -154,7 +165,23 @@ export class DynamicGaussians implements GaussianScene {
    * every frame.
    */
   async readBounds(): Promise<Bounds> {
-    return boundsOf({ ...(await readPlaces(this.#device, this.pages)), origin: this.origin });
+    return (await this.readSample()).bounds;
+  }
+
+  /** The same sample, with the numbers of its rows. */
+  async readSample(): Promise<RowSample> {
+    const places = await readPlaces(this.#device, this.pages);
+    this.#dropped = places.unusable;
+    return {
+      bounds: boundsOf({ ...places, origin: this.origin }),
+      drawn: places.count,
+      unusable: places.unusable,
+    };
+  }
+
+  /** Rows with numbers that cannot be drawn, in the last sample that was read. */
+  get droppedCount(): number {
+    return this.#dropped;
   }
 
   destroy(): void {

@@ -15,6 +15,8 @@ export interface Places {
   readonly positions: Float32Array;
   /** [N] */
   readonly opacities: Float32Array;
+  /** Rows of the sample with numbers that cannot be drawn: the shader that packs rows leaves zeros in their place. */
+  readonly unusable: number;
 }
 
 /** Reads runs of splats that are evenly spread over the pages back from the GPU; splats of opacity 0 are left out. */
@@ -30,14 +32,19 @@ export async function readPlaces(device: GPUDevice, pages: readonly GaussianPage
   const sample = runs.filter((_, i) => i % step === 0);
   const staging = device.createBuffer({
     label: 'gs.places',
-    size: Math.max(4, RUN_BYTES * sample.length),
+    size: Math.max(
+      4,
+      sample.reduce((sum, { size }) => sum + size, 0),
+    ),
     usage: BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination,
   });
   try {
     const encoder = device.createCommandEncoder({ label: 'gs.places' });
-    sample.forEach(({ geometry, offset, size }, i) =>
-      encoder.copyBufferToBuffer(geometry, offset, staging, i * RUN_BYTES, size),
-    );
+    let at = 0;
+    for (const { geometry, offset, size } of sample) {
+      encoder.copyBufferToBuffer(geometry, offset, staging, at, size);
+      at += size;
+    }
     device.queue.submit([encoder.finish()]);
     await staging.mapAsync(0x1);
     return visiblePlaces(new Uint32Array(staging.getMappedRange()));
@@ -49,13 +56,20 @@ export async function readPlaces(device: GPUDevice, pages: readonly GaussianPage
 function visiblePlaces(words: Uint32Array): Places {
   const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
   const [positions, opacities] = [[] as number[], [] as number[]];
+  let unusable = 0;
   for (let at = 0; at + GEOMETRY_WORDS <= words.length; at += GEOMETRY_WORDS) {
     const opacity = opacityOf(words, at);
+    if (words.subarray(at, at + GEOMETRY_WORDS).every((word) => word === 0)) unusable++;
     if (!(opacity > 0)) continue;
     positions.push(floats[at], floats[at + 1], floats[at + 2]);
     opacities.push(opacity);
   }
-  return { count: opacities.length, positions: Float32Array.from(positions), opacities: Float32Array.from(opacities) };
+  return {
+    count: opacities.length,
+    positions: Float32Array.from(positions),
+    opacities: Float32Array.from(opacities),
+    unusable,
+  };
 }
 
 const float = new Float32Array(1);

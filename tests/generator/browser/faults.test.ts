@@ -183,6 +183,15 @@ describe('a fault that the scene survives', () => {
     assert(element.loaded && (await coverOf(element)) > 300, 'a picture');
   });
 
+  it('centers that meet in one point are drawn, and no fault', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}meeting.onnx` });
+    const told: ElementError[] = [];
+    element.addEventListener('generator-error', ({ detail }) => told.push(detail));
+    // Longer than the look at what runs wrote waits for them to rest.
+    await delay(1500);
+    assertEqual([told.map(({ message }) => message), element.stats?.dropped], [[], 0], 'reports, rows dropped');
+  });
+
   itInLab('float16 without shader-f16: on the CPU, and said so', async () => {
     const element = show({ src: HALF });
     const fallback = nextEvent<CustomEvent<{ reason: string }>>(element, 'generator-fallback');

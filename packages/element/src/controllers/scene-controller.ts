@@ -279,9 +279,8 @@ export class SceneController implements ReactiveController {
         this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
         if (++failures >= MAX_FAILURES) {
-          // A scene that has cost one device after the other gets no more of them.
-          const mayReturn = !isNew && !(error instanceof DeviceLostError);
-          return this.#giveUp(request, { signal, error, loss, mayReturn });
+          // A scene that has been shown is loaded once more, some seconds later; as a new one it then gets no other chance.
+          return this.#giveUp(request, { signal, error, loss, mayReturn: !isNew });
         }
         await delay(RETRY_DELAY_MS);
         if (signal.aborted) return;

@@ -9,12 +9,12 @@ const MOST = 1_000_000;
 /** What a look needs: `DynamicGaussians` of the renderer. */
 export interface Watched {
   readonly count: number;
-  readBounds(): Promise<Bounds>;
+  readSample(): Promise<{ readonly bounds: Bounds; readonly drawn: number; readonly unusable: number }>;
 }
 
 /**
- * Looks at where Gaussians are once runs have come to rest. Says once that what a generator writes cannot be drawn at all, for then nothing is seen and nothing
- * has failed; and again after it could.
+ * Looks at the Gaussians once runs have come to rest. Reports once a run whose rows cannot be drawn, for then nothing is seen and nothing has failed; and
+ * again after one that could be. Gaussians without opacity are none of that: scenes fade in.
  */
 export class RunWatch {
   readonly #gaussians: Watched;
@@ -49,24 +49,24 @@ export class RunWatch {
   }
 
   async #look(): Promise<void> {
-    const bounds = await this.#gaussians.readBounds().catch(() => undefined);
+    const sample = await this.#gaussians.readSample().catch(() => undefined);
     // A scene that was closed meanwhile has nothing to tell.
-    if (bounds === undefined) return;
-    // Rows that cannot be drawn are at the origin; one Gaussian alone may be there by right.
-    const isEmpty = this.#gaussians.count > 1 && [...bounds.min, ...bounds.max].every((side) => side === 0);
-    if (isEmpty && !this.#isEmpty) this.#onError(unusable(this.#where));
+    if (sample === undefined) return;
+    const { bounds, drawn, unusable } = sample;
+    const isEmpty = drawn === 0;
+    if (isEmpty && !this.#isEmpty && unusable > 0) this.#onError(notDrawable(this.#where, unusable));
     if (!isEmpty) this.#onBounds(bounds, this.#isEmpty);
     this.#isEmpty = isEmpty;
   }
 }
 
-const unusable = (where: string): ContractError =>
+const notDrawable = (where: string, unusable: number): ContractError =>
   new ContractError([
     {
       code: 'contract/not-finite',
       where,
       expected: 'Gaussians that can be drawn',
-      found: 'a run in which none can: all have numbers that are not finite, or no opacity',
-      remedy: 'npm run gaussian-splat -- check MODEL --run says at which inputs; look there for a division by zero',
+      found: `a run in which none can: ${unusable} rows have numbers that are not finite, no extent, or a rotation of zeros`,
+      remedy: 'look for a division by zero: "gaussian-splat check MODEL --run" says at which inputs',
     },
   ]);

@@ -5,6 +5,7 @@ import { bindInputs } from '../bind-inputs.js';
 import { bindPictures } from '../bind-pictures.js';
 import type { Inputs } from '../input-value.js';
 import type { GeneratorState } from '../state.js';
+import { WeightRelease } from './cadence.js';
 import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
 import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
@@ -33,6 +34,7 @@ export class GeneratorSession {
   readonly #compare: boolean | StartWorker;
   readonly #end = new AbortController();
   readonly #oneInstance: OnnxHeader;
+  readonly #weights: WeightRelease;
   #live: Promise<LiveSession> | undefined;
   #kind: SessionKind | undefined;
   #failures = 0;
@@ -62,6 +64,7 @@ export class GeneratorSession {
     this.#onFallback = onFallback;
     this.#compare = compare;
     this.#oneInstance = oneInstance(model.header, model.contract);
+    this.#weights = new WeightRelease(model, () => void this.#releaseLive());
     requireRoom(model, device);
     void device.lost.then(() => {
       this.#isLost = true;
@@ -129,6 +132,7 @@ export class GeneratorSession {
   }
 
   async #runOnce(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
+    this.#weights.runBegins();
     await this.#rest();
     const first = new FirstUse((outputs) => {
       // A lost device writes nothing, and the runtime does not notice.
@@ -144,6 +148,7 @@ export class GeneratorSession {
       this.#failures = 0;
       this.#hasRun = true;
       this.#hasBroken = false;
+      this.#weights.runEnded();
     } catch (error) {
       throw await this.#afterFailure(live, starting, error);
     }
@@ -179,7 +184,13 @@ export class GeneratorSession {
   /** Lets go of the runtime's session. */
   async release(): Promise<void> {
     this.#isReleased = true;
+    this.#weights.runBegins();
     this.#end.abort();
+    await this.#releaseLive();
+  }
+
+  /** Lets go of the runtime's session and its weights; a later run starts another. */
+  async #releaseLive(): Promise<void> {
     const live = this.#live;
     this.#live = undefined;
     await live?.then(
@@ -219,9 +230,7 @@ export class GeneratorSession {
     if (verdict.result !== 'different' || this.#kind === 'wasm') return;
     this.#refusal = verdict.reason;
     this.#kind = 'wasm';
-    const live = this.#live;
-    this.#live = undefined;
-    void live?.then((session) => session.release()).catch(() => undefined);
+    void this.#releaseLive();
     this.#onFallback(verdict.reason);
   }
 

@@ -2,6 +2,7 @@ import { ContractError, type ContractFault } from '@gaussian-splat/core/contract
 import { constantOutputs, miscomputedConvolutions } from '@gaussian-splat/core/onnx';
 import { isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
 import type { Evidence } from '../proof/prove.js';
+import { cadenceOf } from './cadence.js';
 import { copyOf, evidenceOf, isEqual, readRun, type WrittenRun } from './first-run.js';
 import { LiveSession, type FixedOutputs, type RunOutputs, type SessionKind } from './live-session.js';
 import { loadRuntime, RuntimeGone } from './load-runtime.js';
@@ -66,26 +67,14 @@ export async function startSession(options: StartOptions): Promise<StartedSessio
 }
 
 /**
- * Inputs that change when a person chooses something else, never with a clock, a camera or another model.
- */
-const CHOSEN: ReadonlySet<string> = new Set(['image', 'control', 'shape', 'seed']);
-
-/**
- * A network that turns images into Gaussians runs once for each image. The proof of a recording takes four runs, which no later run earns back.
- */
-function runsOncePerImage({ contract, layout }: GeneratorModel): boolean {
-  const roles = Object.values(contract.inputs).map(({ role }) => role);
-  return layout !== undefined && roles.includes('image') && roles.every((role) => CHOSEN.has(role));
-}
-
-/**
  * Recorded commands must write what commands made anew write, for other inputs than those that they were recorded with, too. Only
  * kernels are recorded: a result in another shape is copied in the first run and then no more. Outputs that are constants are not asked for
  * again: what the first run wrote of them stays.
  */
 async function startOnGpu(options: StartOptions, refusals: string[]): Promise<StartedSession | undefined> {
   const { model, device, keepsEvidence } = options;
-  const isRecordable = canBeRecorded(model) && !runsOncePerImage(model);
+  // The proof of a recording takes four runs, which a model that runs for each choice of a person does not earn back.
+  const isRecordable = canBeRecorded(model) && cadenceOf(model) === 'continuous';
   const constants = isRecordable ? constantOutputs(model.header) : new Set<string>();
   const fixed: FixedOutputs = {};
   const plain = await start('webgpu', options, refusals, (outputs) => {
