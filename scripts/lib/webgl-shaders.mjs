@@ -18,12 +18,16 @@ export const WEBGL_SHADERS = fileURLToPath(new URL('../../packages/renderer/src/
 
 /** What stands in the place of WebGPU's buffers. */
 const REPLACED = { 'shared/stored_gaussian': 'webgl/textured_gaussian' };
-const STAGES = ['project', 'quads', 'compose', 'probe', 'probe_surface'];
+const STAGES = ['project', 'quads', 'hosted_quads', 'compose', 'probe', 'probe_surface'];
 /** What a stage takes as it is from WebGPU's. */
 const SHARED = ['full_screen'];
-const ENTRIES = [['full_screen', 'vertex'], ['quads', 'vertex'], ...STAGES.map((stage) => [stage, 'fragment'])];
+const ENTRIES = [
+  ['full_screen', 'vertex'],
+  ...['quads', 'hosted_quads', 'compose'].map((stage) => [stage, 'vertex']),
+  ...STAGES.map((stage) => [stage, 'fragment']),
+];
 /** Structs of uniforms that WebGPU's stages do not have. */
-const STRUCTS = ['QuadsView', 'ProbeView'];
+const STRUCTS = ['QuadsView', 'HostedView', 'ProbeView'];
 
 const codeOf = (stage) =>
   partsOf(`${SHARED.includes(stage) ? 'shared' : 'webgl'}/${stage}`, REPLACED)

@@ -1,9 +1,20 @@
-// `compose` onto a canvas, whose rows WebGL counts from below.
+// `compose` into a rectangle of a framebuffer, whose rows WebGL counts from below.
 #import shared/compose
-#import shared/full_screen
+
+struct Corner {
+  @builtin(position) position: vec4f,
+  // Shares of the image, from its upper left corner.
+  @location(0) place: vec2f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) i: u32) -> Corner {
+  let at = vec2f(f32(i & 1u), f32(i >> 1u)) * 4.0 - 1.0;
+  return Corner(vec4f(at, 0.0, 1.0), 0.5 * at + 0.5);
+}
 
 @fragment
-fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
-  let height = compose.used.y / compose.scale.y;
-  return composed(vec2f(position.x, height - position.y));
+fn fragment(corner: Corner) -> @location(0) vec4f {
+  // The rectangle may lie anywhere in the framebuffer: its pixels are counted by interpolation, which is exact to far less than half of one.
+  return composed(floor(corner.place * (compose.used / compose.scale)) + 0.5);
 }

@@ -1,6 +1,7 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import { blendLayers, rasterizeQuadsDepth, rasterizeTilesDepth } from './generated/depth-shaders.js';
 import { constants, layouts } from './generated/shaders.js';
+import { deviceReading, type DepthPlanes } from './depth-reading.js';
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Overrides } from './gpu/kernel.js';
 import { writeStruct } from './gpu/struct.js';
 import type { AuxiliaryOutputs, PaintingDepth, QuadsWithDepth, RasterizerName } from './rasterizers/rasterizer.js';
@@ -8,7 +9,7 @@ import { rasterizeKernel } from './rasterizers/tile-kernels.js';
 import { BoundImages, type TilePainter } from './rasterizers/tile-painter.js';
 
 /** Depth that a host has drawn, for splats to be hidden by. */
-export interface HostDepth {
+export interface HostDepth extends DepthPlanes {
   /** Of the formats `depth32float`, `depth24plus`, `depth16unorm`, with or without stencil, or `r32float`; one sample; usage TEXTURE_BINDING; of any size: the image lies on all of it. */
   readonly texture: GPUTexture;
   /**
@@ -16,11 +17,6 @@ export interface HostDepth {
    * there is nothing. Default: `linear` for `r32float`, else `device`.
    */
   readonly values?: 'device' | 'linear' | undefined;
-  /** True if `device` values are 1 at the near plane and 0 at the far one. */
-  readonly reversed?: boolean | undefined;
-  /** Planes of the host's projection, world units; default: the camera's. `far` may be Infinity. */
-  readonly near?: number | undefined;
-  readonly far?: number | undefined;
   /**
    * What is there: a layer among the splats, blended where its depth is passed, in place of a depth at which pixels just end. Premultiplied, in the encoded colors of splats;
    * alpha is the share of the pixel that it covers, so that antialiased edges show the splats behind. As large as {@link texture}, usage TEXTURE_BINDING.
@@ -168,14 +164,7 @@ const isSame = (a: readonly unknown[] | undefined, b: readonly unknown[]): boole
 /** How stored values become camera depths. */
 function readingOf(host: HostDepth | undefined, camera: Camera): { inverse: number[]; nothing: number } {
   if (host === undefined || valuesOf(host) === 'linear') return { inverse: [1, 0, 0, 1], nothing: 0 };
-  const { reversed = false, near = camera.near, far = camera.far } = host;
-  // From 0 at one plane to 1 at the other.
-  const [from, to] = reversed ? [far, near] : [near, far];
-  const nothing = reversed ? 0 : 1;
-  if (camera.orthographic) return { inverse: [to - from, from, 0, 1], nothing };
-  // 1 / depth is linear.
-  const [a, b] = [1 / from, 1 / to];
-  return { inverse: [0, 1, b - a, a], nothing };
+  return deviceReading(host, camera);
 }
 
 const valuesOf = ({ values, texture }: HostDepth): 'device' | 'linear' =>

@@ -16,6 +16,9 @@ export type GlGaussianFacts = Omit<PackedGaussians, 'geometry' | 'sh' | 'chunks'
 export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
 
+/** Runs calls of WebGL at once, and answers what they answer. */
+export type RunGl = <T>(work: () => T) => T;
+
 /** Rows of a texture that hold a number of texels. */
 export const rowsOf = (texels: number): number => Math.max(1, Math.ceil(texels / DATA_WIDTH));
 
@@ -37,14 +40,19 @@ export class GlGaussians {
 
   /**
    * Copies packed Gaussians to the GPU, in parts, so that the thread can do other things between.
+   * @param run runs each part: `GlHost.run` in a context that is not this renderer's alone
    * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures hold, `out-of-memory/allocation`
    */
-  static async upload(gl: WebGL2RenderingContext, packed: PackedGaussians): Promise<GlGaussians> {
-    const made = new GlGaussians(gl, packed);
+  static async upload(
+    gl: WebGL2RenderingContext,
+    packed: PackedGaussians,
+    run: RunGl = (work) => work(),
+  ): Promise<GlGaussians> {
+    const made = run(() => new GlGaussians(gl, packed));
     try {
       requireMemory(gl, `scene of ${packed.count} splats`);
-      await write(gl, made.geometry, { format: gl.RGBA_INTEGER, texelWords: 4, words: packed.geometry });
-      await write(gl, made.sh, { format: gl.RG_INTEGER, texelWords: 2, words: packed.sh });
+      await write(gl, made.geometry, { format: gl.RGBA_INTEGER, texelWords: 4, words: packed.geometry }, run);
+      await write(gl, made.sh, { format: gl.RG_INTEGER, texelWords: 2, words: packed.sh }, run);
       return made;
     } catch (error) {
       made.destroy();
@@ -64,7 +72,12 @@ interface Content {
   readonly words: Uint32Array;
 }
 
-async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content: Content): Promise<void> {
+async function write(
+  gl: WebGL2RenderingContext,
+  texture: WebGLTexture,
+  content: Content,
+  run: RunGl,
+): Promise<void> {
   const { format, texelWords, words } = content;
   const rowWords = DATA_WIDTH * texelWords;
   const rowsAtOnce = Math.floor(WORDS_AT_ONCE / rowWords);
@@ -74,9 +87,13 @@ async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content:
     // What is less than a row goes alone.
     const [width, rows] =
       left < rowWords ? [left / texelWords, 1] : [DATA_WIDTH, Math.min(rowsAtOnce, Math.floor(left / rowWords))];
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, first / rowWords, width, rows, format, gl.UNSIGNED_INT, words, first);
+    const row = first / rowWords;
+    const from = first;
+    run(() => {
+      gl.activeTexture(gl.TEXTURE0);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, rows, format, gl.UNSIGNED_INT, words, from);
+    });
     first += width * rows * texelWords;
   }
 }

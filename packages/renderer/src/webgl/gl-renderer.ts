@@ -1,4 +1,11 @@
-import { SPLAT_FILTERS, validateCamera, type Camera, type ShDegree, type SplatFilter } from '@gaussian-splat/core';
+import {
+  SPLAT_FILTERS,
+  validateCamera,
+  type Camera,
+  type ShDegree,
+  type SplatFilter,
+  type Vector3,
+} from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { constants, layouts } from '../generated/shaders.js';
 import type { StructValues } from '../gpu/struct.js';
@@ -19,6 +26,7 @@ import {
   quadsFragment,
   QuadsView,
   quadsVertex,
+  composeVertex,
   fullScreenVertex,
 } from './shaders.js';
 
@@ -48,6 +56,33 @@ export interface GlFrameRequest {
   readonly accumulation: AccumulationFormat;
   /** Share of the canvas's width and height that is really drawn. */
   readonly resolutionScale: number;
+}
+
+/** A rectangle of a framebuffer, as large as the camera's image. */
+export interface GlFrameTarget {
+  /** null: the canvas. Default: the canvas. */
+  readonly framebuffer?: WebGLFramebuffer | null | undefined;
+  /** Its lower left corner, pixels. Default: 0, 0. */
+  readonly x?: number | undefined;
+  readonly y?: number | undefined;
+  /** Lays the splats over what is there, in place of a background. Default: false. */
+  readonly keeps?: boolean | undefined;
+}
+
+/** What draws the quads of a frame in place of the renderer's own program. */
+export interface GlQuads {
+  use(frame: GlQuadsFrame): void;
+}
+
+export interface GlQuadsFrame {
+  /** The camera, in the pixels that are drawn. */
+  readonly camera: Camera;
+  /** Splats in the order. */
+  readonly count: number;
+  /** What positions in textures are relative to. */
+  readonly origin: Vector3;
+  /** Shapes, paints, order and geometry. */
+  readonly textures: readonly WebGLTexture[];
 }
 
 /** What splats are blended into. */
@@ -102,7 +137,7 @@ export class GlRenderer {
     this.#gaussians = gaussians;
     this.#project = new GlProgram(gl, [fullScreenVertex, projectFragment], layouts.View, ['geometry', 'harmonics']);
     this.#quads = new GlProgram(gl, [quadsVertex, quadsFragment], QuadsView, SPLAT_TEXTURES);
-    this.#compose = new GlProgram(gl, [fullScreenVertex, composeFragment], layouts.Compose, ['accumulated']);
+    this.#compose = new GlProgram(gl, [composeVertex, composeFragment], layouts.Compose, ['accumulated']);
     [this.#corners, this.#indices] = makeCorners(gl);
     const size = [DATA_WIDTH, rowsOf(gaussians.facts.count)] as const;
     this.#shapes = makeTexture(gl, gl.RGBA32UI, size);
@@ -132,27 +167,34 @@ export class GlRenderer {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, DATA_WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, order);
   }
 
-  /** Draws one frame, for {@link present}. @throws GaussianSplatError `argument/camera` for a camera out of range, `out-of-memory/allocation` */
-  render(request: GlFrameRequest): void {
+  /**
+   * Draws one frame, for {@link present}.
+   * @param quads what draws them, in place of the renderer's own program
+   * @throws GaussianSplatError `argument/camera` for a camera out of range, `out-of-memory/allocation`
+   */
+  render(request: GlFrameRequest, quads?: GlQuads): void {
     const { camera, accumulation, resolutionScale } = request;
     validateCamera(camera);
     const drawn = scaled(camera, resolutionScale);
     this.#projectSplats(request, drawn);
-    this.#drawQuads(this.#accumulationOf(camera, accumulation), drawn);
+    this.#drawQuads(this.#accumulationOf(camera, accumulation), drawn, quads);
     this.#last = { camera, drawn };
   }
 
   /**
-   * Composes the last frame onto the canvas, from its lower left corner on.
+   * Composes the last frame onto the canvas, from its lower left corner on, or into another target.
    * @param background premultiplied
    */
-  present(background: Rgba = TRANSPARENT): void {
+  present(background: Rgba = TRANSPARENT, { framebuffer = null, x = 0, y = 0, keeps = false }: GlFrameTarget = {}): void {
     if (this.#last === undefined || this.#accumulation === undefined) return;
     const { camera, drawn } = this.#last;
     const gl = this.#gl;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, camera.width, camera.height);
-    gl.disable(gl.BLEND);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(x, y, camera.width, camera.height);
+    if (keeps) {
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    } else gl.disable(gl.BLEND);
     const scale = [drawn.width / camera.width, drawn.height / camera.height];
     const used = [drawn.width, drawn.height];
     this.#compose.use({ background, scale, used }, [this.#accumulation.texture]);
@@ -224,16 +266,20 @@ export class GlRenderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  #drawQuads({ target }: Accumulation, { width, height }: Camera): void {
+  #drawQuads({ target }: Accumulation, camera: Camera, quads?: GlQuads): void {
     const gl = this.#gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    const { width, height } = camera;
     gl.viewport(0, 0, width, height);
     // Nothing painted yet: black, and all light still to come from behind.
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
     if (this.#count === 0) return;
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.ONE, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
-    this.#quads.use({ viewport: [width, height], count: this.#count, unused: 0 }, this.#splatTextures);
+    const { facts, geometry } = this.#gaussians;
+    const [count, textures] = [this.#count, this.#splatTextures];
+    if (quads) quads.use({ camera, count, origin: facts.origin, textures: [...textures, geometry] });
+    else this.#quads.use({ viewport: [width, height], count, unused: 0 }, textures);
     gl.bindVertexArray(this.#corners);
     const batches = Math.ceil(this.#count / QUAD_BATCH);
     gl.drawElementsInstanced(gl.TRIANGLES, QUAD_BATCH * INDICES_PER_QUAD, gl.UNSIGNED_SHORT, 0, batches);

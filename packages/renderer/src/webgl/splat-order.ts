@@ -1,13 +1,15 @@
 /** Puts splats in order of depth, on a processor: WebGL has no compute shaders. No DOM and no GPU here, since a worker runs it. */
-import type { Camera, Vector3 } from '@gaussian-splat/core';
+import { eyeOf, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 
-/** What an order depends on: the depth of a point p is axis · p + offset. */
+/** What an order depends on: the depth of a point p is axis · p + offset, or its distance from `point`. */
 export interface OrderView {
   readonly axis: Vector3;
   readonly offset: number;
   /** Only splats whose depth is within this range are listed. */
   readonly near: number;
   readonly far: number;
+  /** Where set, splats are in order of their distance from here, and all are listed: turning the camera changes nothing. */
+  readonly point?: Vector3 | undefined;
 }
 
 /** The view of a camera, for positions relative to an origin. */
@@ -16,8 +18,18 @@ export function orderView({ worldToCamera: m, near, far }: Camera, origin: Vecto
   return { axis, offset: axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2] + m[11], near, far };
 }
 
+/** The view of a camera in whose order splats lie by their distance from a point, by default from its eye. */
+export function distanceView(camera: Camera, origin: Vector3, eye: Vector3 = eyeOf(camera.worldToCamera)): OrderView {
+  return { ...orderView(camera, origin), point: subtract(eye, origin) };
+}
+
 export const isSameView = (a: OrderView, b: OrderView): boolean =>
-  a.offset === b.offset && a.near === b.near && a.far === b.far && a.axis.every((value, i) => value === b.axis[i]);
+  a.point || b.point
+    ? isSamePlace(a.point, b.point)
+    : a.offset === b.offset && a.near === b.near && a.far === b.far && isSamePlace(a.axis, b.axis);
+
+const isSamePlace = (a: Vector3 | undefined, b: Vector3 | undefined): boolean =>
+  a !== undefined && b !== undefined && a.every((value, i) => value === b[i]);
 
 /** Values of a digit: half of a float32. */
 const DIGITS = 1 << 16;
@@ -48,7 +60,7 @@ export class SplatOrder {
    * @returns how many are listed
    */
   sort(view: OrderView, target: Uint32Array): number {
-    const count = this.#findKeys(view);
+    const count = view.point ? this.#findDistances(view.point) : this.#findKeys(view);
     const [keys, listed, halfSorted] = [this.#keys, this.#listed, this.#halfSorted];
     startPlaces(this.#low);
     startPlaces(this.#high);
@@ -79,6 +91,24 @@ export class SplatOrder {
       listed[count++] = i;
     }
     return count;
+  }
+
+  /** The same with the squared distance in place of the depth. Coordinates that are no numbers come last. */
+  #findDistances([x, y, z]: Vector3): number {
+    const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
+    const distances = new Float32Array(keys.buffer);
+    low.fill(0);
+    high.fill(0);
+    for (let i = 0, at = 0; i < keys.length; i++, at += 3) {
+      const dx = positions[at] - x;
+      const dy = positions[at + 1] - y;
+      const dz = positions[at + 2] - z;
+      distances[i] = dx * dx + dy * dy + dz * dz;
+      low[keys[i] & 0xffff]++;
+      high[keys[i] >>> 16]++;
+      listed[i] = i;
+    }
+    return keys.length;
   }
 }
 

@@ -1,0 +1,174 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { deviceReading, type DepthPlanes } from '../depth-reading.js';
+import { cameraValues } from '../view.js';
+import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
+import type { RunGl } from './gl-gaussians.js';
+import type { GlFrameRequest, GlFrameTarget, GlQuads, GlQuadsFrame, GlRenderer } from './gl-renderer.js';
+import { borrowState } from './gl-state.js';
+import { hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
+
+const TEXTURES = ['shapes', 'paints', 'order', 'geometry', 'stored_depth'];
+
+/** Where a host draws, and what it has drawn there. */
+export interface GlHostFrame extends Omit<GlFrameTarget, 'keeps'>, DepthPlanes {
+  /**
+   * What hides splats. `framebuffer`: the depth buffer of the framebuffer, which is copied; a texture of depth that is as large as the framebuffer's part up to the
+   * rectangle's upper right corner, without comparison; or nothing. Default: `framebuffer`.
+   */
+  readonly depth?: 'framebuffer' | WebGLTexture | null | undefined;
+}
+
+/** Depth of a host, and where the camera's image lies in it. */
+interface Hidden {
+  readonly texture: WebGLTexture;
+  readonly frame: GlHostFrame;
+  readonly request: GlFrameRequest;
+}
+
+/** A copy of the depth of a framebuffer. */
+interface DepthCopy {
+  readonly texture: WebGLTexture;
+  readonly target: WebGLFramebuffer;
+  readonly of: WebGLFramebuffer | null;
+  readonly width: number;
+  readonly height: number;
+}
+
+/**
+ * Draws splats in the frame of a page that has a WebGL 2 context of its own: a map, or an engine. Splats lie over what the host has drawn, and behind what its depth says
+ * is nearer. The state of the context is put back after each call.
+ *
+ * ```ts
+ * const host = new GlHost(gl);
+ * const gaussians = await GlGaussians.upload(gl, packed, host.run);
+ * const renderer = host.run(() => new GlRenderer(gl, gaussians));
+ * // In each frame, once the host has drawn what is opaque:
+ * host.draw(renderer, { camera, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1 }, { framebuffer, x, y });
+ * ```
+ */
+export class GlHost {
+  readonly #gl: WebGL2RenderingContext;
+  #program: GlProgram<typeof HostedView> | undefined;
+  #copy: DepthCopy | undefined;
+
+  constructor(gl: WebGL2RenderingContext) {
+    this.#gl = gl;
+  }
+
+  /** Runs calls of the renderer, or of WebGL, and puts the context's state back. */
+  readonly run: RunGl = (work) => {
+    const giveBack = borrowState(this.#gl);
+    try {
+      return work();
+    } finally {
+      giveBack();
+    }
+  };
+
+  /**
+   * Draws a frame over what the host has drawn.
+   * @param request the host's camera: see `cameraFromProjection`, with `clipDepth: '-1..1'`
+   * @throws GaussianSplatError `argument/value` for a framebuffer whose depth cannot be copied; as `GlRenderer.render`
+   */
+  draw(renderer: GlRenderer, request: GlFrameRequest, frame: GlHostFrame = {}): void {
+    this.run(() => {
+      const { depth = 'framebuffer' } = frame;
+      const texture = depth === 'framebuffer' ? this.#copyDepth(request, frame) : depth;
+      renderer.render(request, texture === null ? undefined : this.#quads({ texture, frame, request }));
+      renderer.present(undefined, { ...frame, keeps: true });
+    });
+  }
+
+  /** Frees its GPU memory. */
+  destroy(): void {
+    this.#program?.destroy();
+    this.#program = undefined;
+    this.#forgetCopy();
+  }
+
+  #quads({ texture, frame, request: { camera: whole } }: Hidden): GlQuads {
+    const gl = this.#gl;
+    this.#program ??= new GlProgram(gl, [hostedQuadsVertex, hostedQuadsFragment], HostedView, TEXTURES);
+    const program = this.#program;
+    const { x = 0, y = 0 } = frame;
+    return {
+      use({ camera, count, origin, textures }: GlQuadsFrame): void {
+        const { eye, eye_rest } = cameraValues(camera, origin);
+        const m = camera.worldToCamera;
+        const values = {
+          ...{ viewport: [camera.width, camera.height], count, eye, eye_rest },
+          axis: [m[8], m[9], m[10]],
+          ...{ unused: 0, unused_too: 0, unused_as_well: 0 },
+          ...deviceReading(frame, whole),
+          scale: [whole.width / camera.width, whole.height / camera.height],
+          corner: [x, y + whole.height],
+        };
+        program.use(values, [...textures, texture]);
+      },
+    };
+  }
+
+  /** Rectangles of framebuffers with several samples are copied to the same place only: the copy begins at the framebuffer's corner. */
+  #copyDepth({ camera }: GlFrameRequest, { framebuffer = null, x = 0, y = 0 }: GlHostFrame): WebGLTexture {
+    const gl = this.#gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    const [width, height] = [x + camera.width, y + camera.height];
+    const blit = ({ target }: DepthCopy): void => {
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, framebuffer);
+      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target);
+      gl.blitFramebuffer(x, y, width, height, x, y, width, height, gl.DEPTH_BUFFER_BIT, gl.NEAREST);
+    };
+    const copy = this.#copy;
+    if (copy?.of === framebuffer && copy.width === width && copy.height === height) {
+      blit(copy);
+      return copy.texture;
+    }
+    // Formats must be the same, and that of a canvas may be another than it says.
+    for (const format of depthFormats(gl, framebuffer === null)) {
+      const made = this.#makeCopy(format, framebuffer, width, height);
+      blit(made);
+      if (gl.getError() === gl.NO_ERROR) return made.texture;
+    }
+    throw noDepth('one that cannot be copied');
+  }
+
+  #makeCopy(format: GLenum, of: WebGLFramebuffer | null, width: number, height: number): DepthCopy {
+    const gl = this.#gl;
+    this.#forgetCopy();
+    const texture = makeTexture(gl, format, [width, height]);
+    const target = makeTarget(gl, []);
+    const hasStencil = format === gl.DEPTH24_STENCIL8 || format === gl.DEPTH32F_STENCIL8;
+    const attachment = hasStencil ? gl.DEPTH_STENCIL_ATTACHMENT : gl.DEPTH_ATTACHMENT;
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, attachment, gl.TEXTURE_2D, texture, 0);
+    requireMemory(gl, `depth of ${width} x ${height} pixels`);
+    return (this.#copy = { texture, target, of, width, height });
+  }
+
+  #forgetCopy(): void {
+    this.#gl.deleteFramebuffer(this.#copy?.target ?? null);
+    this.#gl.deleteTexture(this.#copy?.texture ?? null);
+    this.#copy = undefined;
+  }
+}
+
+/** Formats that the depth buffer of the bound framebuffer may have, the likeliest first. */
+function depthFormats(gl: WebGL2RenderingContext, isCanvas: boolean): GLenum[] {
+  const [depth, stencil] = isCanvas ? [gl.DEPTH, gl.STENCIL] : [gl.DEPTH_ATTACHMENT, gl.STENCIL_ATTACHMENT];
+  const ask = (attachment: GLenum, name: GLenum): number =>
+    gl.getFramebufferAttachmentParameter(gl.FRAMEBUFFER, attachment, name) as number;
+  const has = (attachment: GLenum): boolean => ask(attachment, gl.FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE) !== gl.NONE;
+  if (!has(depth)) throw noDepth('one without depth');
+  const bits = ask(depth, gl.FRAMEBUFFER_ATTACHMENT_DEPTH_SIZE);
+  const [alone, both] =
+    bits > 24 ? [gl.DEPTH_COMPONENT32F, gl.DEPTH32F_STENCIL8] : [gl.DEPTH_COMPONENT24, gl.DEPTH24_STENCIL8];
+  const likely = isCanvas || has(stencil) ? [both, alone] : [alone, both];
+  return bits > 16 ? likely : [gl.DEPTH_COMPONENT16, ...likely];
+}
+
+const noDepth = (found: string): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'GlHost.draw(): depth',
+    expected: 'a framebuffer with a depth buffer that can be copied, a texture of depth, or null',
+    found,
+    remedy: 'give depth: null, or give the framebuffer (or the context) a depth buffer',
+  });

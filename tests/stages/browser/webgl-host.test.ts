@@ -1,0 +1,221 @@
+/** Splats in the frame of a page that draws with WebGL itself: hidden by its depth, and its state as it was. */
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import { DATA_WIDTH, GlGaussians, GlHost, GlRenderer, orderView, SplatOrder } from '@gaussian-splat/renderer/webgl';
+import { assert, assertEqual } from '../../element/browser/support/harness.js';
+import { proceduralScenes, resized, thinned } from '../../support/scenes.js';
+
+const SPLATS = 4_000;
+const WIDTH = 160;
+/** Of the rectangle in the host's frame. */
+const [X, Y] = [24, 40];
+const GRAY = 102;
+const GEOMETRY_WORDS = 8;
+
+interface Opened {
+  readonly renderer: GlRenderer;
+  sort(camera: Camera): void;
+}
+
+function opened(gl: WebGL2RenderingContext, renderer: GlRenderer, packed: PackedGaussians, host?: GlHost): Opened {
+  void gl;
+  const numbers = new Float32Array(packed.geometry.buffer, packed.geometry.byteOffset, packed.geometry.length);
+  const positions = Float32Array.from(
+    { length: 3 * packed.count },
+    (_, i) => numbers[GEOMETRY_WORDS * Math.floor(i / 3) + (i % 3)],
+  );
+  const sorter = new SplatOrder(positions);
+  const order = new Uint32Array(Math.max(1, Math.ceil(packed.count / DATA_WIDTH)) * DATA_WIDTH);
+  const sort = (camera: Camera): void => {
+    const count = sorter.sort(orderView(camera, packed.origin), order);
+    const set = (): void => renderer.setOrder(order, count);
+    if (host) host.run(set);
+    else set();
+  };
+  return { renderer, sort };
+}
+
+const REQUEST = { accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1 } as const;
+
+/** Bytes of a rectangle of a host's canvas, from its upper row on. */
+function read(gl: WebGL2RenderingContext, x: number, y: number, { width, height }: Camera): Uint8Array {
+  const bytes = new Uint8Array(4 * width * height);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  gl.readPixels(x, y, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+  const row = 4 * width;
+  return bytes.map((_, i) => bytes[row * (height - 1 - Math.floor(i / row)) + (i % row)]);
+}
+
+function context(width: number, height: number, options: WebGLContextAttributes): WebGL2RenderingContext {
+  const canvas = Object.assign(document.createElement('canvas'), { width, height });
+  const gl = canvas.getContext('webgl2', options);
+  if (gl === null) throw new Error('no WebGL 2 in this browser');
+  return gl;
+}
+
+/** The picture of the splats alone over a background, by the renderer in a context of its own. */
+async function alone(cloud: GaussianCloud, camera: Camera, background: number): Promise<Uint8Array> {
+  const gl = context(camera.width, camera.height, { antialias: false, depth: false });
+  const packed = packGaussians(cloud);
+  const { renderer, sort } = opened(gl, new GlRenderer(gl, await GlGaussians.upload(gl, packed)), packed);
+  sort(camera);
+  renderer.render({ ...REQUEST, camera });
+  renderer.present([background, background, background, 1]);
+  const bytes = read(gl, 0, 0, camera);
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return bytes;
+}
+
+const PARAMETERS = [
+  'ACTIVE_TEXTURE ARRAY_BUFFER_BINDING BLEND BLEND_DST_ALPHA BLEND_DST_RGB BLEND_EQUATION_ALPHA BLEND_EQUATION_RGB BLEND_SRC_ALPHA BLEND_SRC_RGB',
+  'COLOR_CLEAR_VALUE COLOR_WRITEMASK CULL_FACE CURRENT_PROGRAM DEPTH_CLEAR_VALUE DEPTH_FUNC DEPTH_TEST DEPTH_WRITEMASK DRAW_FRAMEBUFFER_BINDING',
+  'READ_FRAMEBUFFER_BINDING ELEMENT_ARRAY_BUFFER_BINDING PIXEL_PACK_BUFFER_BINDING PIXEL_UNPACK_BUFFER_BINDING POLYGON_OFFSET_FILL RASTERIZER_DISCARD',
+  'RENDERBUFFER_BINDING SAMPLER_BINDING SCISSOR_BOX SCISSOR_TEST STENCIL_TEST TEXTURE_BINDING_2D UNIFORM_BUFFER_BINDING UNPACK_ALIGNMENT UNPACK_FLIP_Y_WEBGL',
+  'UNPACK_PREMULTIPLY_ALPHA_WEBGL UNPACK_ROW_LENGTH VERTEX_ARRAY_BINDING VIEWPORT',
+].flatMap((line) => line.split(' '));
+
+/** All that a host may have set, as text; objects by their number. */
+function stateOf(gl: WebGL2RenderingContext, known: Map<unknown, number>): string {
+  const named = (value: unknown): unknown => {
+    if (ArrayBuffer.isView(value)) return [...(value as Float32Array)];
+    if (typeof value !== 'object' || value === null || Array.isArray(value)) return value;
+    if (!known.has(value)) known.set(value, known.size);
+    return `object ${known.get(value)}`;
+  };
+  const values = PARAMETERS.map((name) => [name, named(gl.getParameter(gl[name as 'BLEND']))]);
+  const active = gl.getParameter(gl.ACTIVE_TEXTURE) as number;
+  const units = Array.from({ length: 8 }, (_, i) => {
+    gl.activeTexture(gl.TEXTURE0 + i);
+    return named(gl.getParameter(gl.TEXTURE_BINDING_2D));
+  });
+  gl.activeTexture(active);
+  return JSON.stringify([values, units, named(gl.getIndexedParameter(gl.UNIFORM_BUFFER_BINDING, 0))]);
+}
+
+/** A host that paints a gray box before a distance, in a state that suits no other. */
+class Box {
+  readonly #gl: WebGL2RenderingContext;
+  readonly #program: WebGLProgram;
+
+  constructor(gl: WebGL2RenderingContext) {
+    this.#gl = gl;
+    const program = (this.#program = gl.createProgram());
+    const add = (type: GLenum, text: string): void => {
+      const shader = gl.createShader(type)!;
+      gl.shaderSource(shader, `#version 300 es\nprecision highp float;\n${text}`);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    };
+    add(
+      gl.VERTEX_SHADER,
+      'uniform float z; void main() { vec2 p = vec2(gl_VertexID & 1, gl_VertexID >> 1); gl_Position = vec4(p - 0.5, z, 1.0); }',
+    );
+    add(gl.FRAGMENT_SHADER, `out vec4 color; void main() { color = vec4(vec3(${GRAY / 255}), 1.0); }`);
+    gl.linkProgram(program);
+    gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.CULL_FACE);
+    gl.cullFace(gl.FRONT_AND_BACK);
+    gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, true);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, true);
+    gl.activeTexture(gl.TEXTURE3);
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    gl.bindSampler(1, gl.createSampler());
+    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
+    gl.blendFuncSeparate(gl.DST_COLOR, gl.ZERO, gl.ONE, gl.SRC_ALPHA);
+  }
+
+  /** @param depth of the window, 0 to 1 */
+  paint(depth: number, { width, height }: Camera): void {
+    const gl = this.#gl;
+    gl.disable(gl.CULL_FACE);
+    gl.useProgram(this.#program);
+    gl.viewport(X, Y, width, height);
+    gl.clearColor(0, 0, 0, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.uniform1f(gl.getUniformLocation(this.#program, 'z'), 2 * depth - 1);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.enable(gl.CULL_FACE);
+    gl.enable(gl.STENCIL_TEST);
+    gl.stencilFunc(gl.NEVER, 1, 1);
+    gl.colorMask(false, true, false, true);
+  }
+}
+
+describe("splats in a host's frame", () => {
+  const base = thinned(proceduralScenes[0](), SPLATS);
+  const camera: Camera = { ...resized(base.cameras[0], WIDTH), near: 0.1, far: 1000 };
+  const { worldToCamera: m } = camera;
+  const { cloud } = base;
+  const depths = Array.from({ length: cloud.count }, (_, i) => {
+    const p = [0, 1, 2].map((k) => cloud.positions[3 * i + k] + cloud.origin[k]);
+    return m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11];
+  });
+  // Between two splats that lie apart, so that the rounding of 24 bits hides neither.
+  const sorted = depths.filter((depth) => depth > camera.near).sort((a, b) => a - b);
+  const half = sorted.slice(Math.floor(0.45 * sorted.length), Math.floor(0.55 * sorted.length));
+  const gaps = half.slice(1).map((depth, i) => depth - half[i]);
+  const widest = gaps.indexOf(Math.max(...gaps));
+  const middle = (half[widest] + half[widest + 1]) / 2;
+  const stored = (1 / camera.near - 1 / middle) / (1 / camera.near - 1 / camera.far);
+
+  for (const options of [
+    { antialias: false, depth: true, stencil: true },
+    { antialias: true, depth: true, stencil: false },
+  ])
+    it(`are hidden by its depth, ${JSON.stringify(options)}`, async () => {
+      const [width, height] = [camera.width + 2 * X, camera.height + Y + 8];
+      const gl = context(width, height, options);
+      const box = new Box(gl);
+      const host = new GlHost(gl);
+      const known = new Map<unknown, number>();
+      const before = stateOf(gl, known);
+      const packed = packGaussians(cloud);
+      const gaussians = await GlGaussians.upload(gl, packed, host.run);
+      const { renderer, sort } = opened(gl, host.run(() => new GlRenderer(gl, gaussians)), packed, host);
+      assertEqual(stateOf(gl, known), before, 'state after loading');
+      gl.colorMask(true, true, true, true);
+      gl.disable(gl.STENCIL_TEST);
+      box.paint(stored, camera);
+      const drawn = stateOf(gl, known);
+      sort(camera);
+      host.draw(renderer, { ...REQUEST, camera }, { x: X, y: Y });
+      assertEqual(stateOf(gl, known), drawn, 'state after a frame');
+      const found = read(gl, X, Y, camera);
+      assertEqual(gl.getError(), gl.NO_ERROR, 'errors');
+
+      const front = Array.from({ length: cloud.count }, (_, i) => i).filter((i) => depths[i] <= middle);
+      const take = (values: Float32Array, numbers: number): Float32Array =>
+        Float32Array.from(
+          { length: numbers * front.length },
+          (_, i) => values[numbers * front[Math.floor(i / numbers)] + (i % numbers)],
+        );
+      const nearer = {
+        ...cloud,
+        ...{ count: front.length, positions: take(cloud.positions, 3), scales: take(cloud.scales, 3) },
+        ...{ rotations: take(cloud.rotations, 4), opacities: take(cloud.opacities, 1) },
+        sh: take(cloud.sh, cloud.sh.length / cloud.count),
+      } as GaussianCloud;
+      const outside = await alone(cloud, camera, 0);
+      const inside = await alone(nearer, camera, GRAY / 255);
+      const isInside = (i: number): boolean => {
+        const [x, y] = [(i / 4) % camera.width, Math.floor(i / 4 / camera.width)].map(Math.floor);
+        return Math.abs(x + 0.5 - camera.width / 2) < camera.width / 4 && Math.abs(y + 0.5 - camera.height / 2) < camera.height / 4;
+      };
+      let [most, hidden] = [0, 0];
+      // Antialiased edges of the box show both.
+      const isEdge = (i: number): boolean => options.antialias && [-4, 4].some((by) => isInside(i + by * camera.width) !== isInside(i));
+      found.forEach((value, i) => {
+        if (isEdge(i)) return;
+        most = Math.max(most, Math.abs(value - (isInside(i) ? inside : outside)[i]));
+        hidden += isInside(i) ? Math.abs(value - outside[i]) : 0;
+      });
+      assert(most <= 2, `${most} of 255 from our own picture with that depth`);
+      assert(hidden > 1000, 'the box hides nothing');
+      const untouched = read(gl, 0, 0, { ...camera, width: X, height: Y });
+      assert(untouched.every((value, i) => value === (i % 4 === 3 ? 255 : 0)), 'pixels beside the rectangle are touched');
+      host.destroy();
+      renderer.destroy();
+      gaussians.destroy();
+      gl.getExtension('WEBGL_lose_context')?.loseContext();
+    });
+});
