@@ -3,7 +3,7 @@
  * `npm run build -- --element` ends with the CDN bundle: all that a page of one's own needs, in half of the time; `-- --packages` with the packages, which is what
  * most tests of Node need.
  */
-import { copyFileSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, cpSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { writeAttributeRows } from '../packages/element/scripts/attributes.mjs';
 import { writeIntegrity } from '../packages/element/scripts/integrity.mjs';
@@ -19,8 +19,10 @@ const SCRIPTS = [
   'docs/search.js',
   'examples/examples.js',
   'examples/features/features.js',
+  'map/map.js',
   'playground/playground.js',
   'three/three.js',
+  'three-webgl/three-webgl.js',
 ];
 
 /** Texts of ONNX Runtime and of what is in it, as its releases bring them. */
@@ -127,6 +129,9 @@ async function buildDemo() {
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));
   const { build } = await import('esbuild');
+  // The map starts its workers from this file.
+  for (const name of ['maplibre-gl-worker.mjs', 'maplibre-gl.css'])
+    cpSync(join(root, 'node_modules/maplibre-gl/dist', name), join(to, 'map', name));
   await build({
     entryPoints: SCRIPTS.map((name) => join(from, name)),
     outdir: to,

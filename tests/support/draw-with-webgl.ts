@@ -1,9 +1,7 @@
 /** A frame of the WebGL renderer alone, as a canvas has it. In browsers only. */
 import type { Camera } from '@gaussian-splat/core';
 import type { AccumulationFormat, PackedGaussians } from '@gaussian-splat/renderer';
-import { DATA_WIDTH, GlGaussians, GlRenderer, orderView, SplatOrder } from '@gaussian-splat/renderer/webgl';
-
-const GEOMETRY_WORDS = 8;
+import { DATA_WIDTH, GlGaussians, GlRenderer, orderView, positionsIn, SplatOrder } from '@gaussian-splat/renderer/webgl';
 
 /** [height, width, 4] premultiplied, from 8 bits. */
 export async function drawWithWebGl(
@@ -18,13 +16,8 @@ export async function drawWithWebGl(
   const gaussians = await GlGaussians.upload(gl, packed);
   const renderer = new GlRenderer(gl, gaussians);
   try {
-    const numbers = new Float32Array(packed.geometry.buffer, packed.geometry.byteOffset, packed.geometry.length);
-    const positions = Float32Array.from(
-      { length: 3 * packed.count },
-      (_, i) => numbers[GEOMETRY_WORDS * Math.floor(i / 3) + (i % 3)],
-    );
     const order = new Uint32Array(Math.max(1, Math.ceil(packed.count / DATA_WIDTH)) * DATA_WIDTH);
-    renderer.setOrder(order, new SplatOrder(positions).sort(orderView(camera, packed.origin), order));
+    renderer.setOrder(order, new SplatOrder(positionsIn(packed.geometry)).sort(orderView(camera, packed.origin), order));
     renderer.render({ camera, accumulation, shDegree: 3, resolutionScale: 1 });
     renderer.present();
     const bytes = new Uint8Array(4 * width * height);

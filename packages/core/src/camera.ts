@@ -147,6 +147,54 @@ export function cameraFromProjection(
   return camera;
 }
 
+/**
+ * A camera from the one matrix that maps give: from the coordinates of a scene to clip space, perspective.
+ * @param matrix 16 numbers, column-major; it may scale
+ * @throws GaussianSplatError `argument/camera` for a matrix with skew, a mirrored one, and one that is no perspective.
+ */
+export function cameraFromClip(
+  matrix: ArrayLike<number>,
+  { width, height, clipDepth = '0..1' }: ProjectionOptions,
+): Camera {
+  if (matrix?.length !== 16 || !Array.prototype.every.call(matrix, Number.isFinite))
+    fail('matrix', '16 finite numbers, column-major', describe(matrix));
+  const [x, y, z, w] = [0, 1, 2, 3].map((row): Vector3 => [matrix[row], matrix[4 + row], matrix[8 + row]]);
+  const squared = dot(w, w);
+  if (squared === 0) fail('matrix', 'a perspective', describe(Array.from(matrix)));
+  // Rows of clip space are those of the camera: each is a multiple of one, and of the depth's.
+  const axis = (row: Vector3, number: number): { focal: number; shift: number; row: number[] } => {
+    const shift = dot(row, w) / squared;
+    const own = [0, 1, 2].map((k) => row[k] - shift * w[k]) as unknown as Vector3;
+    const focal = Math.sqrt(dot(own, own) / squared);
+    return { focal, shift, row: [...own, matrix[12 + number] - shift * matrix[15]].map((value) => value / focal) };
+  };
+  const [right, up] = [axis(x, 0), axis(y, 1)];
+  const down = up.row.map((value) => -value);
+  const [r, d] = [right.row, down].map(([a, b, c]): Vector3 => [a, b, c]);
+  if (Math.abs(dot(r, d)) > SKEW * squared) fail('matrix', 'no skew', describe(Array.from(matrix)));
+  if (!(dot(cross(r, d), w) > 0)) fail('matrix', 'one that mirrors nothing', describe(Array.from(matrix)));
+  const depth = dot(z, w) / squared;
+  const offset = matrix[14] - depth * matrix[15];
+  const planes = (clipDepth === '0..1' ? [0, 1] : [-1, 1])
+    .map((plane) => offset / (plane - depth))
+    .map((plane) => (Number.isFinite(plane) && plane > 0 ? plane : Infinity));
+  const camera: Camera = {
+    ...{ width, height },
+    worldToCamera: Float64Array.from([...right.row, ...down, ...w, matrix[15], 0, 0, 0, 1]),
+    fx: (right.focal * width) / 2,
+    fy: (up.focal * height) / 2,
+    cx: (width * (1 + right.shift)) / 2,
+    cy: (height * (1 - up.shift)) / 2,
+    near: Math.min(...planes),
+    far: Math.max(...planes),
+  };
+  validateCamera(camera);
+  return camera;
+}
+
+/** Cosine of the angle between the axes of a picture up to which that is none: matrices of maps are rounded. */
+const SKEW = 1e-3;
+
 /** How far the last row of a matrix may be from 0, 0, 0, 1. */
 const AFFINE_ROUNDING = 1e-6;
 

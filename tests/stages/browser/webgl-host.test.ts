@@ -1,7 +1,15 @@
 /** Splats in the frame of a page that draws with WebGL itself: hidden by its depth, and its state as it was. */
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
-import { DATA_WIDTH, GlGaussians, GlHost, GlRenderer, orderView, SplatOrder } from '@gaussian-splat/renderer/webgl';
+import { packGaussians } from '@gaussian-splat/renderer';
+import {
+  DATA_WIDTH,
+  GlGaussians,
+  GlHost,
+  GlRenderer,
+  orderView,
+  positionsIn,
+  SplatOrder,
+} from '@gaussian-splat/renderer/webgl';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import { proceduralScenes, resized, thinned } from '../../support/scenes.js';
 
@@ -10,31 +18,6 @@ const WIDTH = 160;
 /** Of the rectangle in the host's frame. */
 const [X, Y] = [24, 40];
 const GRAY = 102;
-const GEOMETRY_WORDS = 8;
-
-interface Opened {
-  readonly renderer: GlRenderer;
-  sort(camera: Camera): void;
-}
-
-function opened(gl: WebGL2RenderingContext, renderer: GlRenderer, packed: PackedGaussians, host?: GlHost): Opened {
-  void gl;
-  const numbers = new Float32Array(packed.geometry.buffer, packed.geometry.byteOffset, packed.geometry.length);
-  const positions = Float32Array.from(
-    { length: 3 * packed.count },
-    (_, i) => numbers[GEOMETRY_WORDS * Math.floor(i / 3) + (i % 3)],
-  );
-  const sorter = new SplatOrder(positions);
-  const order = new Uint32Array(Math.max(1, Math.ceil(packed.count / DATA_WIDTH)) * DATA_WIDTH);
-  const sort = (camera: Camera): void => {
-    const count = sorter.sort(orderView(camera, packed.origin), order);
-    const set = (): void => renderer.setOrder(order, count);
-    if (host) host.run(set);
-    else set();
-  };
-  return { renderer, sort };
-}
-
 const REQUEST = { accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1 } as const;
 
 /** Bytes of a rectangle of a host's canvas, from its upper row on. */
@@ -57,8 +40,10 @@ function context(width: number, height: number, options: WebGLContextAttributes)
 async function alone(cloud: GaussianCloud, camera: Camera, background: number): Promise<Uint8Array> {
   const gl = context(camera.width, camera.height, { antialias: false, depth: false });
   const packed = packGaussians(cloud);
-  const { renderer, sort } = opened(gl, new GlRenderer(gl, await GlGaussians.upload(gl, packed)), packed);
-  sort(camera);
+  const renderer = new GlRenderer(gl, await GlGaussians.upload(gl, packed));
+  const order = new Uint32Array(Math.ceil(packed.count / DATA_WIDTH) * DATA_WIDTH);
+  const count = new SplatOrder(positionsIn(packed.geometry)).sort(orderView(camera, packed.origin), order);
+  renderer.setOrder(order, count);
   renderer.render({ ...REQUEST, camera });
   renderer.present([background, background, background, 1]);
   const bytes = read(gl, 0, 0, camera);
@@ -170,15 +155,13 @@ describe("splats in a host's frame", () => {
       const known = new Map<unknown, number>();
       const before = stateOf(gl, known);
       const packed = packGaussians(cloud);
-      const gaussians = await GlGaussians.upload(gl, packed, host.run);
-      const { renderer, sort } = opened(gl, host.run(() => new GlRenderer(gl, gaussians)), packed, host);
+      const splats = await host.load(packed);
       assertEqual(stateOf(gl, known), before, 'state after loading');
       gl.colorMask(true, true, true, true);
       gl.disable(gl.STENCIL_TEST);
       box.paint(stored, camera);
       const drawn = stateOf(gl, known);
-      sort(camera);
-      host.draw(renderer, { ...REQUEST, camera }, { x: X, y: Y });
+      assert(splats.draw(camera, { x: X, y: Y }), 'not sorted');
       assertEqual(stateOf(gl, known), drawn, 'state after a frame');
       const found = read(gl, X, Y, camera);
       assertEqual(gl.getError(), gl.NO_ERROR, 'errors');
@@ -199,11 +182,15 @@ describe("splats in a host's frame", () => {
       const inside = await alone(nearer, camera, GRAY / 255);
       const isInside = (i: number): boolean => {
         const [x, y] = [(i / 4) % camera.width, Math.floor(i / 4 / camera.width)].map(Math.floor);
-        return Math.abs(x + 0.5 - camera.width / 2) < camera.width / 4 && Math.abs(y + 0.5 - camera.height / 2) < camera.height / 4;
+        return (
+          Math.abs(x + 0.5 - camera.width / 2) < camera.width / 4 &&
+          Math.abs(y + 0.5 - camera.height / 2) < camera.height / 4
+        );
       };
       let [most, hidden] = [0, 0];
       // Antialiased edges of the box show both.
-      const isEdge = (i: number): boolean => options.antialias && [-4, 4].some((by) => isInside(i + by * camera.width) !== isInside(i));
+      const isEdge = (i: number): boolean =>
+        options.antialias && [-4, 4].some((by) => isInside(i + by * camera.width) !== isInside(i));
       found.forEach((value, i) => {
         if (isEdge(i)) return;
         most = Math.max(most, Math.abs(value - (isInside(i) ? inside : outside)[i]));
@@ -212,10 +199,12 @@ describe("splats in a host's frame", () => {
       assert(most <= 2, `${most} of 255 from our own picture with that depth`);
       assert(hidden > 1000, 'the box hides nothing');
       const untouched = read(gl, 0, 0, { ...camera, width: X, height: Y });
-      assert(untouched.every((value, i) => value === (i % 4 === 3 ? 255 : 0)), 'pixels beside the rectangle are touched');
+      assert(
+        untouched.every((value, i) => value === (i % 4 === 3 ? 255 : 0)),
+        'pixels beside the rectangle are touched',
+      );
       host.destroy();
-      renderer.destroy();
-      gaussians.destroy();
+      splats.destroy();
       gl.getExtension('WEBGL_lose_context')?.loseContext();
     });
 });

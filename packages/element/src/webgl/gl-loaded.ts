@@ -1,13 +1,10 @@
-import { glBytes, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
+import { glBytes, GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
 import { LoadedGaussians, type OwnedGaussians } from '../gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from '../gpu/memory-budget.js';
 import type { Contents, Painter, PainterEvents } from '../gpu/painter.js';
 import type { LoadedScene } from '../loading/protocol.js';
 import { GlPainter } from './gl-painter.js';
 import type { GlLease } from './gl-session.js';
-
-/** 32-bit words of a splat's geometry; the first three are its position. */
-const GEOMETRY_WORDS = 8;
 
 export interface GlUploadOptions {
   readonly signal: AbortSignal;
@@ -79,14 +76,3 @@ export class GlLoaded extends LoadedGaussians {
 }
 
 const NO_MESHES = 'the triangles of the file are not shown: this page draws with WebGL 2, which shows splats alone';
-
-function positionsIn(geometry: Uint32Array): Float32Array {
-  const numbers = new Float32Array(geometry.buffer, geometry.byteOffset, geometry.length);
-  const positions = new Float32Array((3 * geometry.length) / GEOMETRY_WORDS);
-  for (let at = 0, from = 0; at < positions.length; at += 3, from += GEOMETRY_WORDS) {
-    positions[at] = numbers[from];
-    positions[at + 1] = numbers[from + 1];
-    positions[at + 2] = numbers[from + 2];
-  }
-  return positions;
-}

@@ -6,6 +6,8 @@ import { DATA_WIDTH } from './shaders.js';
 
 /** Words that are handed to the GPU at once: 4 MB, some milliseconds. */
 const WORDS_AT_ONCE = 1 << 20;
+/** 32-bit words of a splat's geometry; the first three are its position. */
+const GEOMETRY_WORDS = 8;
 /** Words of what is drawn besides: the projected splat, and its place in the order. */
 const FRAME_WORDS = 9;
 
@@ -15,6 +17,18 @@ export type GlGaussianFacts = Omit<PackedGaussians, 'geometry' | 'sh' | 'chunks'
 /** Bytes of GPU memory that a packed scene takes, what frames keep of each splat included. */
 export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
+
+/** [N, 3] positions of packed splats, relative to their origin. */
+export function positionsIn(geometry: Uint32Array): Float32Array {
+  const numbers = new Float32Array(geometry.buffer, geometry.byteOffset, geometry.length);
+  const positions = new Float32Array((3 * geometry.length) / GEOMETRY_WORDS);
+  for (let at = 0, from = 0; at < positions.length; at += 3, from += GEOMETRY_WORDS) {
+    positions[at] = numbers[from];
+    positions[at + 1] = numbers[from + 1];
+    positions[at + 2] = numbers[from + 2];
+  }
+  return positions;
+}
 
 /** Runs calls of WebGL at once, and answers what they answer. */
 export type RunGl = <T>(work: () => T) => T;
@@ -72,12 +86,7 @@ interface Content {
   readonly words: Uint32Array;
 }
 
-async function write(
-  gl: WebGL2RenderingContext,
-  texture: WebGLTexture,
-  content: Content,
-  run: RunGl,
-): Promise<void> {
+async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content: Content, run: RunGl): Promise<void> {
   const { format, texelWords, words } = content;
   const rowWords = DATA_WIDTH * texelWords;
   const rowsAtOnce = Math.floor(WORDS_AT_ONCE / rowWords);

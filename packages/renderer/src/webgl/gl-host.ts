@@ -1,12 +1,16 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import { deviceReading, type DepthPlanes } from '../depth-reading.js';
 import { cameraValues } from '../view.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
-import type { RunGl } from './gl-gaussians.js';
-import type { GlFrameRequest, GlFrameTarget, GlQuads, GlQuadsFrame, GlRenderer } from './gl-renderer.js';
+import type { PackedGaussians } from '../pack/pack.js';
+import { GlGaussians, positionsIn, rowsOf, type RunGl } from './gl-gaussians.js';
+import { GlRenderer, type GlFrameRequest, type GlFrameTarget, type GlQuads, type GlQuadsFrame } from './gl-renderer.js';
 import { borrowState } from './gl-state.js';
-import { hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
+import { DATA_WIDTH, hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
+import { isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';
 
+/** Sorting that takes longer, ms, is not done for each frame, and takes no more than this share of the time. */
+const [QUICK_SORT_MS, SORT_SHARE] = [8, 0.25];
 const TEXTURES = ['shapes', 'paints', 'order', 'geometry', 'stored_depth'];
 
 /** Where a host draws, and what it has drawn there. */
@@ -40,10 +44,10 @@ interface DepthCopy {
  *
  * ```ts
  * const host = new GlHost(gl);
- * const gaussians = await GlGaussians.upload(gl, packed, host.run);
- * const renderer = host.run(() => new GlRenderer(gl, gaussians));
+ * const splats = await host.load(packGaussians(cloud));
  * // In each frame, once the host has drawn what is opaque:
- * host.draw(renderer, { camera, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1 }, { framebuffer, x, y });
+ * const camera = cameraFromProjection(view, projection, { width, height, clipDepth: '-1..1' });
+ * if (!splats.draw(camera, { framebuffer, x, y })) requestFrame();
  * ```
  */
 export class GlHost {
@@ -79,7 +83,22 @@ export class GlHost {
     });
   }
 
-  /** Frees its GPU memory. */
+  /**
+   * Copies a scene to the GPU, in parts.
+   * @throws GaussianSplatError `out-of-memory/*`, `unsupported/webgl`
+   */
+  async load(packed: PackedGaussians): Promise<HostedSplats> {
+    const gaussians = await GlGaussians.upload(this.#gl, packed, this.run);
+    try {
+      const renderer = this.run(() => new GlRenderer(this.#gl, gaussians));
+      return new HostedSplats(this, renderer, gaussians, new SplatOrder(positionsIn(packed.geometry)));
+    } catch (error) {
+      gaussians.destroy();
+      throw error;
+    }
+  }
+
+  /** Frees its GPU memory, but for that of scenes. */
   destroy(): void {
     this.#program?.destroy();
     this.#program = undefined;
@@ -99,7 +118,7 @@ export class GlHost {
           ...{ viewport: [camera.width, camera.height], count, eye, eye_rest },
           axis: [m[8], m[9], m[10]],
           ...{ unused: 0, unused_too: 0, unused_as_well: 0 },
-          ...deviceReading(frame, whole),
+          ...deviceReading(frame, whole, gl.getParameter(gl.DEPTH_RANGE) as [number, number]),
           scale: [whole.width / camera.width, whole.height / camera.height],
           corner: [x, y + whole.height],
         };
@@ -148,6 +167,58 @@ export class GlHost {
     this.#gl.deleteFramebuffer(this.#copy?.target ?? null);
     this.#gl.deleteTexture(this.#copy?.texture ?? null);
     this.#copy = undefined;
+  }
+}
+
+/** A scene in a host's frames, in order of depth. */
+export class HostedSplats {
+  readonly #host: GlHost;
+  readonly #renderer: GlRenderer;
+  readonly #gaussians: GlGaussians;
+  readonly #sorter: SplatOrder;
+  readonly #order: Uint32Array;
+  #sorted: OrderView | undefined;
+  #sortedAt = -Infinity;
+  #sortMs = 0;
+
+  /** @internal */
+  constructor(host: GlHost, renderer: GlRenderer, gaussians: GlGaussians, sorter: SplatOrder) {
+    this.#host = host;
+    this.#renderer = renderer;
+    this.#gaussians = gaussians;
+    this.#sorter = sorter;
+    this.#order = new Uint32Array(DATA_WIDTH * rowsOf(gaussians.facts.count));
+  }
+
+  /**
+   * Draws the scene over what the host has drawn.
+   * @param camera see `cameraFromProjection`, with `clipDepth: '-1..1'`; where the scene stands is part of its view
+   * @returns false where the order is that of an older view: draw again soon
+   * @throws GaussianSplatError `argument/camera`, `argument/value` for a framebuffer whose depth cannot be copied, `out-of-memory/allocation`
+   */
+  draw(camera: Camera, frame?: GlHostFrame, how: Partial<Omit<GlFrameRequest, 'camera'>> = {}): boolean {
+    const isSorted = this.#sort(camera);
+    const request = { camera, accumulation: 'rgba16float', shDegree: 3, resolutionScale: 1, ...how } as const;
+    this.#host.draw(this.#renderer, request, frame);
+    return isSorted;
+  }
+
+  destroy(): void {
+    this.#renderer.destroy();
+    this.#gaussians.destroy();
+  }
+
+  #sort(camera: Camera): boolean {
+    const view = orderView(camera, this.#gaussians.facts.origin);
+    if (this.#sorted && isSameView(view, this.#sorted)) return true;
+    const begin = performance.now();
+    if (this.#sortMs > QUICK_SORT_MS && begin - this.#sortedAt < this.#sortMs / SORT_SHARE) return false;
+    const count = this.#sorter.sort(view, this.#order);
+    this.#host.run(() => this.#renderer.setOrder(this.#order, count));
+    this.#sorted = view;
+    this.#sortedAt = performance.now();
+    this.#sortMs = this.#sortedAt - begin;
+    return true;
   }
 }
 

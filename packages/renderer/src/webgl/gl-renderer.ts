@@ -185,7 +185,10 @@ export class GlRenderer {
    * Composes the last frame onto the canvas, from its lower left corner on, or into another target.
    * @param background premultiplied
    */
-  present(background: Rgba = TRANSPARENT, { framebuffer = null, x = 0, y = 0, keeps = false }: GlFrameTarget = {}): void {
+  present(
+    background: Rgba = TRANSPARENT,
+    { framebuffer = null, x = 0, y = 0, keeps = false }: GlFrameTarget = {},
+  ): void {
     if (this.#last === undefined || this.#accumulation === undefined) return;
     const { camera, drawn } = this.#last;
     const gl = this.#gl;

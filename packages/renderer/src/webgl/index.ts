@@ -1,7 +1,7 @@
 /** Drawing with WebGL 2 where a browser has no WebGPU: whole scenes, sorted on a processor, by the same shaders. */
 export { drawn, GlClock } from './gl-clock.js';
-export { glBytes, GlGaussians, type GlGaussianFacts, type RunGl } from './gl-gaussians.js';
-export { GlHost, type GlHostFrame } from './gl-host.js';
+export { glBytes, GlGaussians, positionsIn, type GlGaussianFacts, type RunGl } from './gl-gaussians.js';
+export { GlHost, HostedSplats, type GlHostFrame } from './gl-host.js';
 export {
   blendable,
   GlRenderer,
