@@ -1,7 +1,5 @@
-/** Splats as a layer of MapLibre, and beside the meshes of three's WebGLRenderer: at their place, without errors of WebGL, while the camera goes around. */
-import { packGaussians } from '@gaussian-splat/renderer';
-import { GlHost } from '@gaussian-splat/renderer/webgl';
-import { Map as MapLibre, setWorkerUrl } from 'maplibre-gl';
+/** Splats as a layer of MapLibre: at their place, without errors of WebGL, while the map turns. */
+import { Map as MapLibre, setWorkerUrl, type CustomLayerInterface } from 'maplibre-gl';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 
 setWorkerUrl('/node_modules/maplibre-gl/dist/maplibre-gl-worker.mjs');
@@ -10,7 +8,7 @@ const PLACE: [number, number] = [13.4, 52.52];
 interface Layer {
   readonly loaded: Promise<void>;
 }
-type LayerClass = new (options: object) => Layer & maplibregl.CustomLayerInterface;
+type LayerClass = new (options: object) => Layer & CustomLayerInterface;
 
 /** The gray block east of the splats is 40 m wide and 60 m high. */
 const degrees = (east: number, north: number): [number, number] => [
@@ -114,48 +112,5 @@ describe('maps', () => {
     const [free, blocked] = found;
     assert(blocked.count < 0.7 * free.count && blocked.count > 0.3 * free.count, JSON.stringify(found));
     assert(blocked.x > free.x + 5, `the left half is hidden: ${JSON.stringify(found)}`);
-  });
-});
-
-describe("three's WebGLRenderer", () => {
-  it('draws on after splats, with the same picture of its meshes', async () => {
-    const THREE = await import('three');
-    const canvas = Object.assign(document.createElement('canvas'), { width: 160, height: 120 });
-    const renderer = new THREE.WebGLRenderer({ canvas, antialias: false, preserveDrawingBuffer: true });
-    const gl = renderer.getContext() as WebGL2RenderingContext;
-    const scene = new THREE.Scene();
-    const texture = new THREE.DataTexture(new Uint8Array([255, 0, 0, 255, 0, 255, 0, 255]), 2, 1);
-    texture.needsUpdate = true;
-    scene.add(new THREE.Mesh(new THREE.BoxGeometry(), new THREE.MeshBasicMaterial({ map: texture })));
-    const camera = new THREE.PerspectiveCamera(50, 4 / 3, 0.1, 50);
-    camera.position.set(1, 1, 3);
-    camera.lookAt(0, 0, 0);
-    const pixels = (): Uint8Array => {
-      const bytes = new Uint8Array(4 * 160 * 120);
-      gl.readPixels(0, 0, 160, 120, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-      return bytes;
-    };
-    renderer.render(scene, camera);
-    const before = pixels();
-    const host = new GlHost(gl);
-    const { fetchScene, readScene } = await import('@gaussian-splat/formats');
-    const url = `${URL.createObjectURL(await ball())}#ball.splat`;
-    const splats = await host.load(packGaussians(await readScene(await fetchScene(url))));
-    const { cameraFromProjection } = await import('@gaussian-splat/core');
-    const size = { width: 160, height: 120, clipDepth: '-1..1' } as const;
-    splats.draw(cameraFromProjection(camera.matrixWorldInverse.elements, camera.projectionMatrix.elements, size));
-    const withSplats = pixels();
-    assert(
-      withSplats.some((value, i) => Math.abs(value - before[i]) > 50),
-      'no splats',
-    );
-    renderer.render(scene, camera);
-    assertEqual(
-      pixels().findIndex((value, i) => value !== before[i]),
-      -1,
-      'first byte that differs',
-    );
-    assertEqual(gl.getError(), gl.NO_ERROR, 'errors');
-    renderer.dispose();
   });
 });
