@@ -1,7 +1,14 @@
 /** A frame of the WebGL renderer alone, as a canvas has it. In browsers only. */
 import type { Camera } from '@gaussian-splat/core';
 import type { AccumulationFormat, PackedGaussians } from '@gaussian-splat/renderer';
-import { DATA_WIDTH, GlGaussians, GlRenderer, orderView, positionsIn, SplatOrder } from '@gaussian-splat/renderer/webgl';
+import {
+  DATA_WIDTH,
+  GlGaussians,
+  GlRenderer,
+  orderView,
+  positionsIn,
+  SplatOrder,
+} from '@gaussian-splat/renderer/webgl';
 
 /** [height, width, 4] premultiplied, from 8 bits. */
 export async function drawWithWebGl(
@@ -17,7 +24,10 @@ export async function drawWithWebGl(
   const renderer = new GlRenderer(gl, gaussians);
   try {
     const order = new Uint32Array(Math.max(1, Math.ceil(packed.count / DATA_WIDTH)) * DATA_WIDTH);
-    renderer.setOrder(order, new SplatOrder(positionsIn(packed.geometry)).sort(orderView(camera, packed.origin), order));
+    renderer.setOrder(
+      order,
+      new SplatOrder(positionsIn(packed.geometry)).sort(orderView(camera, packed.origin), order),
+    );
     renderer.render({ camera, accumulation, shDegree: 3, resolutionScale: 1 });
     renderer.present();
     const bytes = new Uint8Array(4 * width * height);
