@@ -95,6 +95,47 @@ describe('the pace of pictures', () => {
     assert(waited <= 300 + 2 * whole, `${waited} ms after rest, a frame takes ${whole}`);
   });
 
+  it('a frame of fewer pixels fades into the true image, and nothing of it stays', async () => {
+    const element = await showLoaded({ ...SCENE, 'interpolation-decay': '0' }, SIZE);
+    await findPace(element);
+    const overlay = (): HTMLCanvasElement | null => element.shadowRoot!.querySelector('canvas[aria-hidden]');
+    const isSmaller = (): boolean => /at 0/.test(element.stats!.dynamicQuality.drawn);
+    for (let i = 0; i < 20 && !isSmaller(); i++) await turnFor(element, 300);
+    assert(isSmaller(), `drawn with ${element.stats!.dynamicQuality.drawn}`);
+    await until(() => overlay() !== null, 'the last frame of the motion lies over the canvas');
+    const canvas = element.shadowRoot!.querySelector('canvas')!;
+    const { width, height } = overlay()!;
+    assertEqual([width, height], [canvas.width, canvas.height], 'its pixels');
+    const bounds = [canvas, overlay()!].map((each) => JSON.stringify(each.getBoundingClientRect()));
+    assertEqual(bounds[0], bounds[1], 'where it lies');
+    await until(() => overlay()!.getAnimations().length > 0, 'it fades');
+    assertEqual(element.stats!.dynamicQuality.drawn, 'whole', 'beneath it');
+    const sum = [canvas, overlay()!].reduce((weights, each) => weights + Number(getComputedStyle(each).opacity), 0);
+    assert(Math.abs(sum - 1) < 0.01, `weights of ${sum}`);
+    await until(() => overlay() === null, 'it is gone');
+    assertEqual(getComputedStyle(canvas).opacity, '1', 'the canvas is opaque again');
+    assertEqual(canvas.parentElement!.style.isolation, '', 'and not isolated');
+    // A motion that begins meanwhile ends the fade at once.
+    for (let i = 0; i < 20 && !isSmaller(); i++) await turnFor(element, 300);
+    await until(() => overlay() !== null, 'it fades once more');
+    await turnFor(element, 100);
+    assert(overlay() === null, 'nothing lies over what moves');
+  });
+
+  it('a small subject is not drawn with levels that would lose nearly all of it', async () => {
+    const element = await showLoaded({ ...SCENE, 'camera-orbit': '0deg 75deg 500%' }, SIZE);
+    const names = new Set<string>();
+    const end = performance.now() + 6_000;
+    for (let degrees = 1; performance.now() < end || names.size < 2; degrees++) {
+      element.cameraOrbit = `${degrees % 40}deg 75deg 500%`;
+      await frames(1);
+      names.add(element.stats!.dynamicQuality.drawn);
+    }
+    // 0.71 of its pixels keep 28 dB, half of them 25.
+    const others = [...names].filter((name) => !['whole', 'balanced', 'balanced at 0.71'].includes(name));
+    assertEqual(others, [], 'levels of fewer pixels');
+  });
+
   it('makes no pipeline in motion, after another quality neither', async () => {
     // On a device of its own: what others have made for theirs is there. Here quads draw, for which one set of pipelines serves all; tiles have another for motion.
     const shared = GaussianSplatElement.sharedDevice;

@@ -1,8 +1,10 @@
 import type { PerFrameSettings } from '@gaussian-splat/renderer';
 import type { WorkTime } from '@gaussian-splat/renderer/tools';
 import { targetMsOf, type FrameScheduler } from '../gpu/frame-scheduler.js';
-import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
-import { keepPace, resized } from '../pace/pace.js';
+import { canFade, Fade, FADE_MS } from '../pace/fade.js';
+import { levelsFor, LADDER, type Level, type Losses } from '../pace/ladder.js';
+import { keepPace, limited, resized } from '../pace/pace.js';
+import { lossesOf } from '../pace/picture-loss.js';
 import { quantile } from '../pace/display-interval.js';
 import { INITIAL_PACE, waitForRest, type Pace, type PaceReason } from '../pace/start.js';
 
@@ -39,6 +41,9 @@ export interface FrameOccasion {
   readonly goesOn: boolean;
 }
 
+/** Draws the frame. @param onTime gets what it took */
+export type DrawFrame = (levers: FramePlan['levers'], onTime?: (time: WorkTime) => void) => void;
+
 /** What the controller says about itself. */
 export interface DynamicQualityReport {
   /** Name of the level that the last frame was drawn with; `whole` is the image at rest. */
@@ -62,6 +67,8 @@ export interface PaceOptions {
   /** What the page allows a frame, ms; infinite where the display says. */
   readonly frameBudget: () => number;
   readonly requestFrame: () => void;
+  /** False where frames cost more than to be drawn: those of a post-processor. */
+  readonly mayFade: () => boolean;
   /** Called for each frame of a motion that was timed: whether such are drawn whole. */
   readonly onPace: (isWhole: boolean) => void;
   /** Default: the element's. */
@@ -89,6 +96,11 @@ export class PaceController {
   /** What the last true image took, of those that are known. */
   #wholeMs = 0;
   #restTimer: ReturnType<typeof setTimeout> | undefined;
+  readonly #fade = new Fade();
+  /** What fewer pixels lose of the scene as it was last seen; undefined while that is not known. */
+  #losses: Losses | undefined;
+  /** The search for it that goes on. */
+  #measuring: Promise<Losses> | undefined;
 
   constructor(options: PaceOptions) {
     this.#options = options;
@@ -115,6 +127,52 @@ export class PaceController {
   }
 
   /**
+   * Draws the next frame on a canvas. Coming to rest from fewer pixels, the last frame of the motion is drawn once more, since only what a task has drawn can be copied; the true
+   * image, which follows, fades in from under the copy.
+   */
+  draw(occasion: FrameOccasion, canvas: HTMLCanvasElement, render: DrawFrame): void {
+    if (!this.#options.isOn()) {
+      this.reset();
+      return render(undefined);
+    }
+    const before = this.#drawn;
+    const plan = this.plan(occasion);
+    if (occasion.hasChanged || !this.#options.mayFade()) this.#fade.end();
+    else if (plan.level === 0 && before.scale < 1 && this.#settle(before, canvas, render)) return;
+    // All pixels while it is not known what fewer lose.
+    const isUnknown = this.#drawn.scale < 1 && !this.#losses;
+    if (isUnknown) this.#drawn = this.#levels.findLast(({ scale }) => scale === 1)!;
+    render(this.#drawn.levers, (time) => {
+      if (plan.level === 0) this.#fade.start(canvas);
+      if (!isUnknown) this.sample(plan, time);
+    });
+    if (this.#measuring) return;
+    if (isUnknown || (plan.level === 0 && this.#pace.level > 0)) this.#measure(canvas, occasion.pixels);
+  }
+
+  /** @returns whether the frame was one more of the motion */
+  #settle(before: Level, canvas: HTMLCanvasElement, render: DrawFrame): boolean {
+    if (this.#fade.isCovering || !canFade(canvas)) return false;
+    this.#drawn = before;
+    render(before.levers);
+    if (!this.#fade.isAwaited) void this.#fade.cover(canvas).then(this.#options.requestFrame);
+    return true;
+  }
+
+  /** Finds what fewer pixels lose of the frame just drawn. Where that cannot be found all levels serve. */
+  #measure(canvas: HTMLCanvasElement, pixels: number): void {
+    const scales = this.#all.flatMap(({ scale }) => (scale < 1 ? scale : []));
+    const measuring = lossesOf(canvas, scales).catch((): Losses => new Map());
+    this.#measuring = measuring;
+    void measuring.then((losses) => {
+      if (this.#measuring !== measuring) return;
+      this.#measuring = undefined;
+      this.#losses = losses;
+      this.#fit(pixels);
+    });
+  }
+
+  /**
    * How to draw the next frame. A single change after a rest is drawn whole at once; what goes on to change is in motion.
    */
   plan({ now, pixels, hasChanged, goesOn }: FrameOccasion): FramePlan {
@@ -130,18 +188,21 @@ export class PaceController {
     if (hasChanged) this.#changedAt = now;
     const level = isMotion ? this.#pace.level : 0;
     this.#drawn = this.#levels[level];
-    if (hasChanged || level === 0) this.stop();
+    if (hasChanged || level === 0) this.#cancelRest();
     const { displayInterval } = this.#options.scheduler();
-    if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, displayInterval));
+    if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs + FADE_MS, displayInterval));
     return { level, levers: this.#drawn.levers, size: this.#size };
   }
 
   #fit(pixels: number): void {
-    const levels = levelsFor(pixels, this.#all);
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
+    if (isOther) this.#losses = this.#measuring = undefined;
+    const levels = levelsFor(pixels, this.#all, this.#losses);
+    const isLimit = !isOther && this.#losses !== undefined;
     if (!isOther && levels.length === this.#levels.length) return;
     this.#levels = levels;
-    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#levels);
+    this.#pace = isLimit ? limited(this.#pace, levels) : resized(this.#pace, pixels / this.#pixels, levels);
+    if (isLimit) return;
     this.#pixels = pixels;
     this.#size++;
   }
@@ -173,10 +234,16 @@ export class PaceController {
     this.#drawn = this.#all[0];
     this.#lastMs = null;
     this.#wholeMs = 0;
+    this.#losses = this.#measuring = undefined;
   }
 
   /** No frame follows. */
   stop(): void {
+    this.#cancelRest();
+    this.#fade.end();
+  }
+
+  #cancelRest(): void {
     clearTimeout(this.#restTimer);
     this.#restTimer = undefined;
   }

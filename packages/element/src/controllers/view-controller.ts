@@ -1,5 +1,4 @@
 import { Lazy, type Camera } from '@gaussian-splat/core';
-import type { WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -77,6 +76,7 @@ export class ViewController implements FrameClient {
         scheduler: () => host.scheduler,
         frameBudget: () => host.attributes.frameBudget,
         requestFrame: () => this.requestFrame(),
+        mayFade: () => !this.#painter?.filter,
         onPace: (isWhole) => host.notePace(isWhole),
       }));
   }
@@ -221,17 +221,15 @@ export class ViewController implements FrameClient {
     const content = this.#host.prepareFrame();
     const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
     this.#drawnContent = content;
-    const pixels = request.camera.width * request.camera.height;
-    const goesOn = this.#host.camera.isMoving;
-    const pace = this.#pace;
-    const plan = pace?.plan({ now, pixels, hasChanged, goesOn });
-    // Who has chosen a quality pays for no clock.
-    const onTime = pace && plan && this.#isAuto ? (time: WorkTime) => pace.sample(plan, time) : undefined;
     if (first !== undefined) {
       painter.renderFirst(request, content).then(() => this.#afterFirst(painter, first), first.reject);
       return;
     }
-    painter.render({ ...request, levers: plan?.levers }, content, onTime);
+    const pixels = request.camera.width * request.camera.height;
+    const occasion = { now, pixels, hasChanged, goesOn: this.#host.camera.isMoving };
+    const draw: dynamicQuality.DrawFrame = (levers, onTime) => painter.render({ ...request, levers }, content, onTime);
+    if (this.#pace) this.#pace.draw(occasion, this.#host.canvas!, draw);
+    else draw(undefined);
     this.#prepareSoon(painter);
   }
 

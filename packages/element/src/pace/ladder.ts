@@ -39,6 +39,15 @@ export const LADDER: readonly Level[] = [
 /** Fewest pixels that a level leaves: the parts of a smaller image have so many splats each that it takes the longer. */
 const LEAST_PIXELS = 8192;
 
-/** Those of the levels that serve an image of so many pixels. */
-export const levelsFor = (pixels: number, levels: readonly Level[]): readonly Level[] =>
-  levels.filter(({ scale }) => scale === 1 || scale ** 2 * pixels >= LEAST_PIXELS);
+/** What shares of a picture's pixels across and down lose of it, dB; of hair and of small subjects half of them lose nearly all. */
+export type Losses = ReadonlyMap<number, number>;
+
+/** Levels whose pictures are less like the true one are none: over 10 % of what is covered would be off by more than 16/255 (docs/decisions/0014). */
+export const LEAST_DECIBELS = 27;
+
+/** Those of the levels that serve an image of so many pixels, of which fewer pixels lose so much. */
+export const levelsFor = (pixels: number, levels: readonly Level[], losses?: Losses): readonly Level[] =>
+  levels.filter(
+    ({ scale }) =>
+      scale === 1 || (scale ** 2 * pixels >= LEAST_PIXELS && (losses?.get(scale) ?? Infinity) >= LEAST_DECIBELS),
+  );

@@ -159,6 +159,12 @@ function change(pace: Pace, now: number, level: number, reason: PaceReason, pred
   };
 }
 
+/** The pace where other levels serve an image of the same size: what was measured of those that stay counts on. */
+export function limited(pace: Pace, levels: readonly Level[]): Pace {
+  const last = levels.length - 1;
+  return pace.level <= last ? pace : { ...pace, level: last, recent: [], believed: 0 };
+}
+
 /**
  * The pace where images have so many times the pixels, and other levels may serve: what was measured says nothing of these. Fewer pixels are drawn with as
  * many of them as before, for they take no longer.

@@ -1,0 +1,82 @@
+import { addLoss, decibelsOf, type LossSum, type Pixels } from './loss.js';
+
+/** Blocks of the picture that are looked at: across and down at most, and pixels of a side. */
+const [BLOCKS, SIDE] = [6, 32];
+/** Cells, across and down, by which it is found where the picture shows something. */
+const CELLS = 64;
+
+/** Where a block lies in the picture. */
+interface Block extends Pixels {
+  readonly x: number;
+  readonly y: number;
+}
+
+/**
+ * What frames of fewer pixels lose of a picture, by the share of its pixels across and down: dB over what is covered of blocks that are spread over it. The work is
+ * divided into tasks of a few milliseconds.
+ * @param canvas whose frame was drawn in the running task
+ */
+export async function lossesOf(canvas: HTMLCanvasElement, scales: readonly number[]): Promise<Map<number, number>> {
+  const blocks = blocksOf(await createImageBitmap(canvas));
+  const found = new Map<number, number>();
+  for (const scale of scales) {
+    const sum: LossSum = { sum: 0, values: 0 };
+    for (const { x, y, ...pixels } of blocks) addLoss(pixels, scale, x, y, sum);
+    found.set(scale, decibelsOf(sum));
+    await new Promise((resolve) => setTimeout(resolve));
+  }
+  return found;
+}
+
+/** Blocks spread over what is covered; closer together where that is little, so that none of it lies in their edges alone, which are not compared. */
+function blocksOf(picture: ImageBitmap): Block[] {
+  const { x, y, width, height } = coveredOf(picture);
+  const [columns, rows] = [width, height].map((pixels) => Math.min(BLOCKS, Math.ceil((2 * pixels) / SIDE)));
+  const context = contextOf(columns * SIDE, rows * SIDE);
+  const placed = Array.from({ length: columns * rows }, (_, k) => {
+    const [column, row] = [k % columns, Math.floor(k / columns)];
+    const left = firstOf(x + ((column + 0.5) * width) / columns, picture.width);
+    const top = firstOf(y + ((row + 0.5) * height) / rows, picture.height);
+    context.drawImage(picture, left, top, SIDE, SIDE, column * SIDE, row * SIDE, SIDE, SIDE);
+    return { x: left, y: top, column, row };
+  });
+  const [across, down] = [Math.min(SIDE, picture.width), Math.min(SIDE, picture.height)];
+  picture.close();
+  return placed.map(({ x, y, column, row }) => {
+    const { data } = context.getImageData(column * SIDE, row * SIDE, across, down);
+    return { values: premultiplied(data), width: across, height: down, x, y };
+  });
+}
+
+/** The first pixel of a block around a place. */
+const firstOf = (middle: number, pixels: number): number =>
+  Math.max(0, Math.min(pixels - SIDE, Math.round(middle - SIDE / 2)));
+
+/** The rectangle of what is covered, to a cell; the whole picture where nothing is. */
+function coveredOf(picture: ImageBitmap): Pick<DOMRect, 'x' | 'y' | 'width' | 'height'> {
+  const context = contextOf(CELLS, CELLS);
+  context.drawImage(picture, 0, 0, CELLS, CELLS);
+  const { data } = context.getImageData(0, 0, CELLS, CELLS);
+  const covered = Array.from({ length: CELLS * CELLS }, (_, i) => i).filter((i) => data[4 * i + 3] > 0);
+  const [columns, rows] = [covered.map((i) => i % CELLS), covered.map((i) => Math.floor(i / CELLS))];
+  const [x, width] = span(columns, picture.width);
+  const [y, height] = span(rows, picture.height);
+  return { x, y, width, height };
+}
+
+/** First pixel and number of pixels from the least of some cells to the greatest. */
+function span(cells: readonly number[], pixels: number): [number, number] {
+  if (cells.length === 0) return [0, pixels];
+  const [first, last] = [Math.min(...cells), Math.max(...cells)];
+  return [(first * pixels) / CELLS, ((last - first + 1) * pixels) / CELLS];
+}
+
+function contextOf(width: number, height: number): OffscreenCanvasRenderingContext2D {
+  const context = new OffscreenCanvas(width, height).getContext('2d');
+  if (context === null) throw new Error('no 2D canvas');
+  return context;
+}
+
+function premultiplied(data: Uint8ClampedArray): Float32Array {
+  return Float32Array.from(data, (value, i) => (value / 255) * (i % 4 === 3 ? 1 : data[i | 3] / 255));
+}
