@@ -169,6 +169,7 @@ async function turn(page: Page, work: number, looks = 0, onFrame: () => void = (
     scheduler: () => ({ displayInterval: INTERVAL, clients: 1 }) as FrameScheduler,
     frameBudget: () => Infinity,
     requestFrame: () => undefined,
+    mayFade: () => true,
     onPace: () => undefined,
     levels: LEVELS,
   });

@@ -24,6 +24,7 @@ const paceOf = (options: Partial<PaceOptions> = {}): PaceController =>
     scheduler: () => display,
     frameBudget: () => Infinity,
     requestFrame: () => undefined,
+    mayFade: () => true,
     onPace: () => undefined,
     levels: LEVELS,
     ...options,
