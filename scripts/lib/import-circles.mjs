@@ -3,7 +3,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { dirname, join, relative } from 'node:path';
 
 /** Tables of what is loaded late: they import files that may ask them for others. */
-const REGISTRIES = ['formats.ts'];
+const REGISTRIES = ['formats.ts', 'late-formats.ts'];
 /** `from '…'` and `import('…')`, as formatted by Prettier. */
 const STATIC = /\bfrom\s*'(\.{1,2}\/[^']+)'/g;
 const SPECIFIER = /(?:\bfrom|\bimport\()\s*'(\.{1,2}\/[^']+)'/g;

@@ -93,7 +93,7 @@ const NAMED: readonly [name: string, bytes: Uint8Array, kind: RegExp, remedy: Re
   ['scene.usdz', archive('default.usda', 'gauss.usda'), /OpenUSD/, /PLY or SPZ/],
   ['any', text('PXR-USDC\0\0\0\0'), /OpenUSD/, /PLY or SPZ/],
   ['scene.slpk', archive('3dSceneLayer.json.gz', 'nodes/0'), /I3S/, /convert/i],
-  ['tiles.3tz', archive('tileset.json', 'a/0.b3dm'), /3D Tiles/, /\.glb/],
+  ['0.b3dm', TWELVE, /3D Tiles/, /\.glb/],
   ['reply', text('{"geometricError": 1, "root": {"children": []}, "x": 1}'), /3D Tiles/, /\.glb/],
   ['scene.lcc', text('{"version": "5.0", "totalSplats": 1000}'), /LCC scene/, /splat-transform/],
   ['reply', text('{"version": "5.0", "totalSplats": 1000}'), /LCC scene/, /splat-transform/],
@@ -138,7 +138,7 @@ const CASES: Readonly<Record<string, RegExp>> = {
   'spz-splat-transform-2.7.1.spz': /^3 splats classic assumed$/,
   'spz-splat-transform-3.7.0.spz': /^3 splats classic assumed$/,
   'stg-lite.ply': /decode\/unsupported.*SpacetimeGaussians/,
-  'tileset.json': /decode\/unsupported.*3D Tiles/,
+  'tileset.json': /decode\/unsupported.*0\/0\.glb: expected a way to open the other files/,
   'up-nerfstudio-z.ply': /^\d+ splats classic up 0 0 1$/,
 };
 /** Those of the third review; opacities and the first position that their source has. */

@@ -35,7 +35,6 @@ const KINDS: readonly (readonly [what: string, bytes: Uint8Array, code: string, 
   ['JPEG', Uint8Array.of(0xff, 0xd8, 0xff, 0xe0), 'decode/unknown-format', /JPEG/],
   ['text', text('Hello, world\n'), 'decode/unknown-format', /a text: "Hello/],
   ['a ksplat that is cut', new Uint8Array(100), 'decode/truncated', /4,096/, 'a/scene.ksplat?x'],
-  ['a .rad scene', new Uint8Array(100), 'decode/unsupported', /\.rad/, 'a/scene.rad'],
   ['bytes', Uint8Array.of(7, 7, 7), 'decode/unknown-format', /bytes that begin with 07 07 07/],
   ['a PLY that is no PLY', text('plyers of the game'), 'decode/unknown-format', /a text/, 'x.ply'],
 ];
@@ -130,7 +129,7 @@ test('content speaks before the name', { skip: needsSharedData }, async () => {
 
 test('the registry names every format once and its loaders give readers', async () => {
   assert.deepEqual(sceneFormats.map(({ name }) => name).sort(), [
-    ...['compressed-ply', 'gltf', 'ksplat', 'lod', 'ply', 'sog', 'splat', 'spz', 'zip'],
+    ...['compressed-ply', 'gltf', 'ksplat', 'lod', 'ply', 'rad', 'sog', 'splat', 'spz', 'zip'],
   ]);
   for (const { extensions, mimeTypes, load } of sceneFormats) {
     for (const extension of extensions) assert.match(extension, /^(\.[a-z]+)+$/);

@@ -1,5 +1,5 @@
 import { foreignName } from './foreign-signatures.js';
-import { sceneFormats, signedFormat } from './formats.js';
+import { sceneFormats } from './late-formats.js';
 import type { SceneFormat, SceneFormatName } from './scene-format.js';
 import { looksLikeSplats } from './splat/plausible.js';
 
@@ -17,7 +17,7 @@ export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): Sc
 
 /** The format's entry in the registry; see {@link detectFormat}. */
 export function findFormat(bytes: Uint8Array, name: string, contentType: string): SceneFormat | undefined {
-  const signed = signedFormat(bytes);
+  const signed = sceneFormats.find(({ hasSignature }) => hasSignature?.(bytes));
   if (signed || bytes.length === 0) return signed;
   // The first bytes of a `.splat` may be any, those of a text too.
   const isSplat = extensionOf(name) === '.splat' && looksLikeSplats(bytes, 'all');

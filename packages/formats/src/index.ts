@@ -1,7 +1,7 @@
 export { LoadBudget, type LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
 export { fetchScene, openPartAt, type FetchSceneOptions } from './fetch-scene.js';
-export { sceneFormats } from './formats.js';
+export { sceneFormats } from './late-formats.js';
 export { outOfMemory } from './scene-errors.js';
 export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';
 export { readCoarsest } from './lod/read-coarsest.js';

@@ -7,7 +7,7 @@ import type { SceneFormat, SceneReader } from './scene-format.js';
 
 /** The parts of this package that are loaded when they are first needed. All throw GaussianSplatError `network/unreachable`. */
 
-export const loadReader = ({ title, load }: SceneFormat): Promise<SceneReader> =>
+export const loadReader = ({ title, load }: Pick<SceneFormat, 'title' | 'load'>): Promise<SceneReader> =>
   loadModule(`the code that reads ${title}`, load);
 
 /** What knows files that are no scene. */

@@ -55,7 +55,8 @@ export type OpenPart = (path: string, query?: string) => Promise<Uint8Array>;
  */
 export type SceneReader = (source: SceneSource) => GaussianCloud | Promise<GaussianCloud>;
 
-export type SceneFormatName = 'ply' | 'compressed-ply' | 'spz' | 'splat' | 'ksplat' | 'sog' | 'lod' | 'gltf' | 'zip';
+export type SceneFormatName =
+  'ply' | 'compressed-ply' | 'spz' | 'splat' | 'ksplat' | 'sog' | 'lod' | 'gltf' | 'zip' | 'rad';
 
 /** A file format that `readScene` reads: what it is called, how it is recognised, and where its reader is. */
 export interface SceneFormat {

@@ -19,7 +19,7 @@ export const isCompressedPly = (bytes: Uint8Array): boolean => {
 /** With the only method there is, and no flag that has no meaning: a `.splat` may begin with the first two bytes. */
 export const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b, 8]) && (bytes[3] & 0xe0) === 0;
 /** A description in JSON with a key that no other has. Keys come in any order, and one may have megabytes (buffers of glTF), so the samples are long and of both ends. */
-const isJsonWith =
+export const isJsonWith =
   (key: RegExp) =>
   (bytes: Uint8Array): boolean =>
     isJsonObject(bytes) && key.test(asciiOf(bytes, 0, USUAL_HEADER_BYTES) + asciiOf(bytes, -USUAL_HEADER_BYTES));
@@ -29,6 +29,8 @@ export const isGltf = isJsonWith(/"(asset|bufferViews)"\s*:\s*[[{]/);
 /** A file; none; and volumes of which this is the only one. */
 const ZIP_STARTS = ['PK\x03\x04', 'PK\x05\x06', 'PK00PK\x03\x04', 'PK\x07\x08PK\x03\x04'];
 export const isZip = (bytes: Uint8Array): boolean => ZIP_STARTS.some((start) => startsWith(bytes, start));
+/** A scene of Spark, or a chunk of one. */
+export const isRad = (bytes: Uint8Array): boolean => startsWith(bytes, 'RAD0') || startsWith(bytes, 'RADC');
 export const isNgsp = (bytes: Uint8Array): boolean => startsWith(bytes, 'NGSP');
 
 /** Bytes of the header of a `.ksplat`; those of its sections follow. */

@@ -17,7 +17,6 @@ const CONVERT = 'convert it to SPZ or PLY, for example with splat-transform or S
 const EXPORT = 'save the splats as PLY with the trainer that wrote it, and give that file';
 
 export const UNREAD_KINDS: readonly UnreadKind[] = [
-  { found: 'a .rad scene of Spark', remedy: CONVERT, extensions: /^rad$/ },
   {
     found: 'an LCC2 scene of XGRIDS',
     remedy: CONVERT,
@@ -82,11 +81,10 @@ export const UNREAD_KINDS: readonly UnreadKind[] = [
     within: /(^|\/)3dSceneLayer\.json(\.gz)?$/i,
   },
   {
-    found: 'a tileset of 3D Tiles',
+    found: 'a tile, or a tileset, of 3D Tiles',
     remedy: 'give one of the .glb files that it names, or convert the tiles to SPZ or PLY',
-    extensions: /^(3tz|b3dm|pnts|i3dm|cmpt)$/,
+    extensions: /^(b3dm|pnts|i3dm|cmpt)$/,
     fits: (_, text) => /"geometricError"\s*:/.test(text),
-    within: /(^|\/)(tileset\.json|@3dtilesIndex1@)$/i,
   },
 ];
 

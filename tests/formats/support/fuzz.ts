@@ -8,6 +8,7 @@ import { buildGltf, writeGlb } from './gltf-writer.js';
 import { writeKsplat } from './ksplat-writer.js';
 import { writePly } from './ply-writer.js';
 import { smallCloud } from './small-cloud.js';
+import { writeRad } from './rad-writer.js';
 import { writeSog, writeSogV1, type SogFiles } from './sog-writer.js';
 import { inriaColumns, rawSplats } from './splats.js';
 import { writeSpz } from './spz-writer.js';
@@ -89,6 +90,9 @@ function splatFile(): Uint8Array {
   return bytes;
 }
 
+const tileset = (children: readonly object[]): Buffer =>
+  Buffer.from(JSON.stringify({ asset: { version: '1.1' }, geometricError: 9, root: { refine: 'ADD', children } }));
+
 /** One scene and more of every format. */
 export function fuzzScenes(): Readonly<Record<string, readonly FuzzScene[]>> {
   const { json, buffer } = buildGltf(
@@ -125,6 +129,23 @@ export function fuzzScenes(): Readonly<Record<string, readonly FuzzScene[]>> {
         files: {
           'a.gltf': Buffer.from(JSON.stringify({ ...json, buffers: [{ uri: 'a.bin', byteLength: buffer.length }] })),
           'a.bin': buffer,
+        },
+      },
+    ],
+    rad: [
+      { name: 'scene.rad', files: writeRad(cloud, { chunkSize: 8, isSplit: true }) },
+      { name: 'scene.rad', files: writeRad(cloud, { palette: 4, children: [2, ...Array<number>(11).fill(0)] }) },
+    ],
+    tiles: [
+      {
+        name: 'tileset.json',
+        files: {
+          'tileset.json': tileset([{ content: { uri: 'a.glb' } }, { contents: [{ uri: 'b/tileset.json?x' }] }]),
+          'b/tileset.json': tileset([
+            { transform: [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 5, 5, 1], content: { uri: 'b.glb' } },
+          ]),
+          'a.glb': writeGlb(json, buffer),
+          'b/b.glb': writeGlb(json, buffer),
         },
       },
     ],

@@ -2,6 +2,7 @@
 import { gzipSync } from 'node:zlib';
 import { strToU8, zipSync } from 'fflate';
 import { buildGltf, writeGlb } from './gltf-writer.js';
+import { writeRad } from './rad-writer.js';
 import { smallCloud } from './small-cloud.js';
 import { writeSog } from './sog-writer.js';
 import { writeWebp } from './webp-writer.js';
@@ -80,6 +81,9 @@ function overlappingZip(count: number): Uint8Array {
   return Buffer.concat([one.subarray(0, view.getUint32(end + 16, true)), directory, tail]);
 }
 
+const tiles = (uris: string[]): Uint8Array =>
+  json({ asset: {}, geometricError: 1, root: { children: uris.map((uri) => ({ content: { uri } })) } });
+
 /** By what is multiplied. */
 export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>> = {
   'frames of a pattern': (n) => ({
@@ -108,6 +112,29 @@ export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>
   'splats of a SOG of one colour': (n) => {
     const { meta, image } = plainSog(Math.min(1_500, Math.ceil(Math.sqrt(256 * n))));
     return { file: zipSync({ 'meta.json': json(meta), i: image }, { level: 9 }) };
+  },
+  'tiles of a tileset': (n) => ({
+    file: zipSync({ 'tileset.json': tiles(many(n, () => 'a.glb')), 'a.glb': writeGlb(gltf, buffer) }),
+  }),
+  'tilesets in a tileset': (n) => ({
+    file: zipSync({ 'tileset.json': tiles(many(n, () => 'b.json')), 'b.json': tiles(many(n, () => 'b.json')) }),
+  }),
+  'chunks of a RAD': (n) => {
+    const { 'scene.rad': file } = writeRad(smallCloud(400, 3));
+    const start = 8 + 8 * Math.ceil(file.readUInt32LE(4) / 8);
+    const [chunk] = (JSON.parse(file.subarray(8, 8 + file.readUInt32LE(4)).toString()) as { chunks: object[] }).chunks;
+    const text = Buffer.from(JSON.stringify({ version: 1, type: 'gsplat', chunks: many(n, () => chunk) }));
+    const head = Buffer.alloc(8 + 8 * Math.ceil(text.length / 8), 'RAD0');
+    head.writeUInt32LE(text.length, 4);
+    text.copy(head, 8);
+    return { file: Buffer.concat([head, file.subarray(start)]) };
+  },
+  'splats of a RAD of one colour': (n) => {
+    const count = Math.min(2_000_000, 100 * n);
+    const zeros = (length: number): Float32Array => new Float32Array(length);
+    const cloud = { ...smallCloud(1, 3), count, positions: zeros(3 * count), scales: zeros(3 * count).fill(1) };
+    const [opacities, rotations, sh] = [zeros(count).fill(1), zeros(4 * count).fill(1), zeros(48 * count)];
+    return { file: writeRad({ ...cloud, opacities, rotations, sh }, { chunkSize: count })['scene.rad'] };
   },
   'spaces before a SOG': (n) => ({ file: zipSync({ 'meta.json': strToU8(' '.repeat(100 * n) + '{}') }) }),
   'lists in the index of a streamed SOG': (n) => ({

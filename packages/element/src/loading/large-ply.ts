@@ -4,7 +4,7 @@ import { MOST_DROPPED, splatRanges, type LoadLimits, type SplatRanges } from '@g
 import { packGaussians } from '@gaussian-splat/renderer';
 import { joinShares, SHARE_SPLATS, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer/tools';
 import type { LoadListeners } from './load-scene.js';
-import { packRows, type ShareAnswer, type ShareRequest } from './pack-shares.js';
+import { packRows, release, type ShareAnswer, type ShareRequest } from './pack-shares.js';
 import { PartPreviews } from './part-previews.js';
 import type { LoadedScene, SceneRequest } from './protocol.js';
 
@@ -122,7 +122,9 @@ export class LargePly {
       if (droppedCount > MOST_DROPPED * this.#count) return undefined;
       this.#listeners.onReading?.(true);
       const facts = { shDegree, antialiased, filterVariance, origin, droppedCount };
-      const joined = joinShares(packed, { sh: this.#sh }, facts);
+      // Without the file and the shares a scene takes a third of the memory.
+      const onSettled = (): void => release(bytes);
+      const joined = joinShares(packed, { sh: this.#sh, onSettled, release }, facts);
       if (typeof joined !== 'string') {
         const { positions, opacities } = joined;
         const bounds = boundsOf({ count: opacities.length, positions, opacities, origin });

@@ -35,13 +35,22 @@ export interface ShareAnswer {
 /** Reads and packs some rows. Never throws for what is in them. */
 export async function packRows({ share, bytes, shPrecision, name }: ShareRequest): Promise<ShareAnswer> {
   const cloud = await readPrefix(bytes, { name });
+  release(bytes);
   if (cloud === undefined) return { share };
   const { shDegree, antialiased, filterVariance, origin, hints, warnings } = cloud;
-  return {
+  const { positions, scales, rotations, opacities, sh } = cloud;
+  const answer = {
     ...{ share, shDegree, antialiased, filterVariance, origin, up: hints?.up, order: hints?.order, warnings },
     packed: packShare(cloud, shPrecision),
     preview: samplePreview(cloud),
   };
+  release(positions, scales, rotations, opacities, sh);
+  return answer;
+}
+
+/** Gives memory back at once. Browsers count such buffers late: without it those of many shares lie side by side. Older ones cannot do it. */
+export function release(...arrays: ArrayBufferView[]): void {
+  for (const { buffer } of arrays) (buffer as { transfer?: (bytes: number) => unknown }).transfer?.(0);
 }
 
 /** Packs what comes through a port until the worker is ended. */

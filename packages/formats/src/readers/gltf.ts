@@ -10,7 +10,8 @@ import { warn } from '../faults.js';
 import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
-import { transformCloud } from '../transform/transform-cloud.js';
+import { isFar, movedCloud } from '../transform/moved-cloud.js';
+import { isJsonWith } from '../signatures.js';
 import { noParts } from './sog.js';
 
 /** glTF's axes are left, up and forward, seen from what is shown; a cloud's are right, down and forward. */
@@ -19,15 +20,23 @@ const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 /** Charged for each primitive of splats, each time that the scene shows it: a short file can name the same ones over and over. */
 const PRIMITIVE_BYTES = 1024;
 
-/** Splats by which the middle of a primitive is found. */
-const SAMPLES = 4096;
-
 /**
  * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives of the default scene that hold splats, each moved by its nodes
  * (spherical harmonics turn along), uncompressed or as SPZ. Degrees may differ. Meshes and points without the extension,
  * cameras, lights and animations are left out; `hints.meshes` says that there are some of the first.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
+  if (isTileset(source.bytes)) {
+    const { readTiles } = await loadModule('the code that reads 3D Tiles', () => import('./tiles.js'));
+    return readTiles(source);
+  }
+  return readSplats(source);
+}
+
+/** The JSON of 3D Tiles has an asset, too. */
+export const isTileset = isJsonWith(/"geometricError"\s*:/);
+
+async function readSplats(source: SceneSource): Promise<GaussianCloud> {
   const { name, signal, range } = source;
   const { document, placed, others } = open(source);
   if (placed.length === 0) throw noSplats(document.json, name, others);
@@ -53,7 +62,7 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
     if (isOpen) activate(cloud, activation);
     if (hasLinearColors(primitive)) await encodeColors(cloud);
     const inScene = multiply(TO_CLOUD, toScene);
-    clouds.push(moved(cloud, isOpen && activation.isInPlyFrame ? multiply(inScene, TO_CLOUD) : inScene));
+    clouds.push(movedCloud(cloud, isOpen && activation.isInPlyFrame ? multiply(inScene, TO_CLOUD) : inScene));
   }
   const whole =
     clouds.length === 1
@@ -92,33 +101,6 @@ function noteLeftOut(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
   const { animations } = json;
   if (Array.isArray(animations) && animations.length > 0)
     warn(cloud, `${grouped(animations.length)} animations are left out for splats: they are drawn as they stand.`);
-}
-
-/** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
-const isFar = (map: Affine): boolean => [3, 7, 11].some((k) => Math.abs(map[k]) >= 1_000);
-
-/** The cloud in the scene. Far from (0, 0, 0) the middle of its splats becomes the origin, so that they keep their digits. */
-function moved(cloud: GaussianCloud, map: Affine): GaussianCloud {
-  if (!isFar(map) || cloud.count === 0) {
-    transformCloud(cloud, map);
-    return cloud;
-  }
-  const [x, y, z] = [0, 1, 2].map((axis) => middleOf(cloud, axis));
-  const at = (row: number): number => map[row] * x + map[row + 1] * y + map[row + 2] * z + map[row + 3];
-  const origin = [at(0), at(4), at(8)] as const;
-  transformCloud(
-    cloud,
-    map.map((value, k) => (k % 4 === 3 ? value - origin[k >> 2] : value)),
-  );
-  return { ...cloud, origin };
-}
-
-/** Median of some of the coordinates along an axis: one that cannot be drawn may be anywhere. */
-function middleOf({ positions, count }: GaussianCloud, axis: number): number {
-  const step = 3 * Math.ceil(count / SAMPLES);
-  const sample: number[] = [];
-  for (let k = axis; k < positions.length; k += step) if (Number.isFinite(positions[k])) sample.push(positions[k]);
-  return sample.sort((a, b) => a - b)[sample.length >> 1] ?? 0;
 }
 
 /** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, stand in another file, have numbers of another meaning than the extension gives them, or lie so far that they have an origin of their own. */

@@ -12,6 +12,7 @@ import { listed, namedLike, relevant, shallowest } from '../zip/paths.js';
 const DESCRIPTIONS = [
   ['lod-meta.json', MAX_INDEX_BYTES],
   ['meta.json', MAX_META_BYTES],
+  ['tileset.json', MAX_INDEX_BYTES],
 ] as const;
 /** So many files with these names are opened at most to find a scene. */
 const MAX_DESCRIPTIONS = 16;

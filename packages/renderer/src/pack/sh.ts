@@ -16,6 +16,7 @@ export const FIRST_CODE_BYTE = 8;
 export const SCALE_STEPS = 8;
 export const SCALE_BIAS = 16;
 const MAX_CODE = 255;
+const scaleOf = (code: number): number => 2 ** (code / SCALE_STEPS - SCALE_BIAS);
 
 /** PSNR of a single splat, rounded as `int8`, that {@link choosePrecision} asks for on average: images then lose no more than 75 dB of noise. */
 const INT8_NOISE_DB = 62;
@@ -29,10 +30,20 @@ const PART_SAMPLES = 8;
 export type NoiseOf = (splat: number) => number;
 
 /** {@link NoiseOf} the splats of a cloud. */
-export const noiseIn =
-  ({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>): NoiseOf =>
-  (splat) =>
-    shNoise(sh, splat * 3 * shCoefficientCount(shDegree), shDegree);
+export function noiseIn({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>): NoiseOf {
+  const bits = bitsOf(sh);
+  const numbers = 3 * shCoefficientCount(shDegree);
+  return (splat) => {
+    let noise = 0;
+    let first = splat * numbers + 3;
+    for (let band = 0; band < shDegree; band++) {
+      const end = first + 3 * BAND_SIZES[band];
+      noise += BAND_SIZES[band] * CODE_NOISE[scaleCodeOf(bits, first, end)];
+      first = end;
+    }
+    return noise;
+  };
+}
 
 /**
  * `int8` where it is precise enough, in the scene as a whole and in each of its parts: coefficients are rounded to within s / 254, s the scale of their band, evenly spread; seen from a
@@ -61,32 +72,11 @@ function meanNoise(noiseOf: NoiseOf, kept: Uint32Array, first: number, end: numb
   return noise / Math.max(1, samples);
 }
 
-/** Eighths of an octave that magnitudes have, nearly always. */
-const POWERS = Float64Array.from({ length: 512 }, (_, k) => 2 ** ((k - 256) / SCALE_STEPS));
-
-/** 2 to so many eighths. */
-const powerOf = (eighths: number): number => POWERS[eighths + 256] ?? 2 ** (eighths / SCALE_STEPS);
-
-function shNoise(sh: Float32Array, first: number, shDegree: ShDegree): number {
-  let noise = 0;
-  let at = first + 3;
-  for (let band = 1; band <= shDegree; band++) {
-    const size = 3 * (2 * band + 1);
-    const scale = powerOf(Math.ceil(SCALE_STEPS * Math.log2(largestOf(sh, at, size))));
-    noise += ((scale / 127) ** 2 / 12) * ((2 * band + 1) / (4 * Math.PI));
-    at += size;
-  }
-  return noise;
-}
-
-function largestOf(sh: Float32Array, first: number, count: number): number {
-  let largest = 0;
-  for (let k = first; k < first + count; k++) {
-    const size = Math.abs(sh[k]);
-    if (size > largest) largest = size;
-  }
-  return largest;
-}
+/** The variance that a coefficient of a band adds, for each code of its scale. No scale is larger than the last. */
+export const CODE_NOISE = Float64Array.from(
+  { length: MAX_CODE + 1 },
+  (_, code) => code && (code < MAX_CODE ? (scaleOf(code) / 127) ** 2 / (48 * Math.PI) : Infinity),
+);
 
 /** 32-bit words of one splat's spherical harmonics: 2, 4, 8, 14 as `int8`, 2, 6, 14, 24 as `float16` for degree 0 to 3. */
 export function shWords(degree: ShDegree, precision: ShPrecision): number {
@@ -116,9 +106,9 @@ function packHalf({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
   return new Uint32Array(halves.buffer);
 }
 
-/** What a coefficient is multiplied by to get its code, for each code of a scale. */
+/** What a coefficient is multiplied by to get its code, for each code of a scale: 0 for bands that are too small or too large for any. */
 const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
-  code === 0 ? 0 : 127 / 2 ** (code / SCALE_STEPS - SCALE_BIAS),
+  code && code < MAX_CODE ? 127 / scaleOf(code) : 0,
 );
 
 function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Array {
@@ -127,37 +117,45 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
   const bytes = new Uint8Array(words.buffer);
   const halves = new Uint16Array(words.buffer);
   const stride = 4 * shWords(shDegree, 'int8');
+  const bits = bitsOf(sh);
   let at = 0;
-  for (let k = 0; k < kept.length; k++) {
-    const splat = kept[k] * numbers;
-    for (let channel = 0; channel < 3; channel++) halves[at / 2 + channel] = halfBits(sh[splat + channel]);
-    let first = splat + 3;
+  for (const splat of kept) {
+    let first = splat * numbers;
+    for (let channel = 0; channel < 3; channel++) halves[at / 2 + channel] = halfBits(sh[first++]);
     let code = at + FIRST_CODE_BYTE;
     for (let band = 0; band < shDegree; band++) {
-      const size = 3 * BAND_SIZES[band];
-      const scaleCode = scaleCodeOf(largestOf(sh, first, size));
+      let end = first + 3 * BAND_SIZES[band];
+      const scaleCode = scaleCodeOf(bits, first, end);
       const perUnit = PER_UNIT[scaleCode];
-      // Degree 1 has nine codes and room for eight: the last takes the place of the scale of band 2.
-      const behind = Math.min(size, stride - (code - at));
-      for (let n = 0; n < behind; n++) bytes[code + n] = codeOf(sh[first + n] * perUnit);
-      if (behind < size) bytes[at + SCALE_BYTES[1]] = codeOf(sh[first + behind] * perUnit);
       bytes[at + SCALE_BYTES[band]] = scaleCode;
-      first += size;
-      code += size;
+      // Degree 1 has nine codes and room for eight: the last takes the place of the scale of band 2.
+      if (shDegree === 1) bytes[at + SCALE_BYTES[1]] = codeOf(sh[--end] * perUnit);
+      while (first < end) bytes[code++] = codeOf(sh[first++] * perUnit);
     }
     at += stride;
   }
   return words;
 }
 
-/** A share of the scale, in 1/127, to the nearest; the last of halves goes up. */
-function codeOf(value: number): number {
-  return Math.floor(Math.min(127, Math.max(-127, value)) + 0.5);
-}
+/** A share of the scale, in 1/127, to the nearest; the last of halves goes up. Truncation rounds down above 0, and bytes keep the lower 8 bits of a sum with 256. */
+const codeOf = (value: number): number => (value + 256.5) | 0;
 
-/** The code of a scale for coefficients of that size; 0 means all zeros. */
-function scaleCodeOf(largest: number): number {
-  // The small number: a magnitude that is a step itself must not be lifted to the next by a rounding of the logarithm.
-  const steps = largest > 0 ? Math.ceil(SCALE_STEPS * (Math.log2(largest) + SCALE_BIAS) - 1e-6) : 0;
-  return Math.min(MAX_CODE, Math.max(0, steps));
+const bitsOf = ({ buffer, byteOffset, length }: Float32Array): Int32Array => new Int32Array(buffer, byteOffset, length);
+
+/** The bits of the largest number that a scale is enough for. The small number: one that is a step itself must not be lifted to the next by rounding. */
+const MOST_BITS = bitsOf(Float32Array.from({ length: MAX_CODE }, (_, code) => scaleOf(code + 1e-6)));
+/** The upper 12 bits of a float32, of a scale of code 0. */
+const FIRST_EIGHTH = (127 - SCALE_BIAS) * SCALE_STEPS;
+
+/** The code of a scale for finite coefficients, given by their bits, whose order is that of magnitudes; 0 means all zeros. */
+function scaleCodeOf(bits: Int32Array, first: number, end: number): number {
+  let largest = 0;
+  for (let k = first; k < end; k++) {
+    const size = bits[k] & 0x7fffffff;
+    if (size > largest) largest = size;
+  }
+  // The logarithm of 1 + m, m in 0..1, is m or more, so the first is not too large.
+  let code = Math.max(0, (largest >>> 20) - FIRST_EIGHTH);
+  while (largest > MOST_BITS[code]) code++;
+  return Math.min(MAX_CODE, code);
 }

@@ -4,7 +4,7 @@ import { CHUNK_NUMBERS, reachOf } from './chunks.js';
 import { mortonOrder } from './morton.js';
 import { GEOMETRY_WORDS, packGeometry, type PackedGaussians, type PackOptions } from './pack.js';
 import { recentred } from './recentre.js';
-import { choosePrecision, noiseIn, packSh, shWords, type ShPrecision } from './sh.js';
+import { BAND_SIZES, choosePrecision, CODE_NOISE, packSh, SCALE_BYTES, shWords, type ShPrecision } from './sh.js';
 
 const { CULL_GROUP } = constants;
 
@@ -27,8 +27,6 @@ export interface PackedShare {
   readonly opacities: Float32Array<ArrayBuffer>;
   /** How far each splat reaches from its centre: see `boundChunks`. */
   readonly reaches: Float32Array<ArrayBuffer>;
-  /** What `int8` would do to the colour of each: see `choosePrecision`. */
-  readonly noises: Float64Array<ArrayBuffer>;
 }
 
 /** What the shares of a scene have in common. */
@@ -48,21 +46,26 @@ export interface JoinedShares {
   readonly opacities: Float32Array;
 }
 
+/** How shares are put together. */
+export interface JoinOptions extends PackOptions {
+  /** Called once the shares have the precision that the scene needs: the file is of no more use. */
+  readonly onSettled?: () => void;
+  /** Frees arrays of shares that have been copied. */
+  readonly release?: (...arrays: ArrayBufferView[]) => void;
+}
+
 /** Packs at most {@link SHARE_SPLATS} splats, all of which can be drawn. */
 export function packShare(cloud: GaussianCloud, shPrecision: ShPrecision): PackedShare {
   const { count } = cloud;
   const order = mortonOrder(cloud.positions, identity(count), SHARE_SAMPLES);
-  const noiseOf = noiseIn(cloud);
-  const noises = new Float64Array(count);
   const reaches = new Float32Array(count);
   const opacities = new Float32Array(count);
   for (let k = 0; k < count; k++) {
-    noises[k] = noiseOf(order[k]);
     reaches[k] = reachOf(cloud, order[k]);
     opacities[k] = cloud.opacities[order[k]];
   }
   return {
-    ...{ count, shPrecision, opacities, noises, reaches },
+    ...{ count, shPrecision, opacities, reaches },
     rows: Uint16Array.from(order),
     geometry: packGeometry(cloud, order) as Uint32Array<ArrayBuffer>,
     sh: packSh(cloud, order, shPrecision) as Uint32Array<ArrayBuffer>,
@@ -76,7 +79,7 @@ export function packShare(cloud: GaussianCloud, shPrecision: ShPrecision): Packe
  */
 export function joinShares(
   shares: readonly PackedShare[],
-  { sh: asked = 'auto' }: PackOptions,
+  { sh: asked = 'auto', onSettled, release }: JoinOptions,
   facts: ShareFacts,
 ): JoinedShares | ShPrecision {
   const count = shares.reduce((sum, share) => sum + share.count, 0);
@@ -84,9 +87,9 @@ export function joinShares(
   const cloud = recentred({ ...facts, count, positions, opacities } as GaussianCloud);
   const usable = usableOf(cloud.positions, count);
   const kept = mortonOrder(cloud.positions, usable);
-  const noiseOf = (i: number): number => shares[places[i] >>> SHIFT].noises[places[i] & MASK];
-  const shPrecision = asked === 'auto' ? choosePrecision(noiseOf, kept) : asked;
+  const shPrecision = asked === 'auto' ? precisionFor(shares, facts.shDegree, kept, places) : asked;
   if (shares.some((share) => share.shPrecision !== shPrecision)) return shPrecision;
+  onSettled?.();
   const packed = {
     ...{
       count: kept.length,
@@ -103,6 +106,7 @@ export function joinShares(
       places,
       cloud.positions === positions ? undefined : cloud.positions,
       shWords(facts.shDegree, shPrecision),
+      release,
     ),
   };
   return { packed, positions, opacities };
@@ -116,6 +120,25 @@ const identity = (count: number): Uint32Array => {
   for (let i = 0; i < count; i++) all[i] = i;
   return all;
 };
+
+/** As the scales of their `int8` codes say; shares have `float16` only once that has been found too coarse. */
+function precisionFor(
+  shares: readonly PackedShare[],
+  shDegree: ShDegree,
+  kept: Uint32Array,
+  places: Uint32Array,
+): ShPrecision {
+  if (shares.some(({ shPrecision }) => shPrecision !== 'int8')) return 'float16';
+  const codes = shares.map(({ sh }) => new Uint8Array(sh.buffer));
+  const stride = 4 * shWords(shDegree, 'int8');
+  return choosePrecision((i) => {
+    const at = stride * (places[i] & MASK);
+    let noise = 0;
+    for (let band = 0; band < shDegree; band++)
+      noise += BAND_SIZES[band] * CODE_NOISE[codes[places[i] >>> SHIFT][at + SCALE_BYTES[band]]];
+    return noise;
+  }, kept);
+}
 
 /** Of all shares, and where each splat lies: its share, and its number there. */
 function columnsOf(
@@ -153,38 +176,54 @@ function usableOf(positions: Float32Array, count: number): Uint32Array {
   return usable.subarray(0, kept);
 }
 
-/** The words of the splats in their order, and the bounds of each chunk of them. Its time is waiting for memory: a splat is read once, where it lies. */
+/** The words of the splats in their order, and the bounds of each chunk of them. Its time is waiting for memory, and processors wait for reads only: shares are read from their first splat to their last. */
 function gather(
   shares: readonly PackedShare[],
   kept: Uint32Array,
   places: Uint32Array,
   moved: Float32Array | undefined,
   shStride: number,
+  release: JoinOptions['release'],
 ): Pick<PackedGaussians, 'geometry' | 'sh' | 'chunks'> {
   const geometry = new Uint32Array(GEOMETRY_WORDS * kept.length);
-  const floats = new Float32Array(geometry.buffer);
   const sh = new Uint32Array(shStride * kept.length);
+  const reaches = new Float32Array(kept.length);
+  const targets = new Uint32Array(shares.length << SHIFT).fill(LEFT_OUT);
+  for (let k = 0; k < kept.length; k++) targets[places[kept[k]]] = k;
+  shares.forEach((share, number) => {
+    const own = targets.subarray(number << SHIFT, (number + 1) << SHIFT);
+    spread(share.geometry, own, geometry, GEOMETRY_WORDS, share.count);
+    spread(share.sh, own, sh, shStride, share.count);
+    for (let i = 0; i < share.count; i++) if (own[i] !== LEFT_OUT) reaches[own[i]] = share.reaches[i];
+    release?.(share.geometry, share.sh);
+  });
+  const floats = new Float32Array(geometry.buffer);
+  if (moved)
+    for (let k = 0; k < kept.length; k++)
+      for (let axis = 0; axis < 3; axis++) floats[GEOMETRY_WORDS * k + axis] = moved[3 * kept[k] + axis];
   const chunks = new Float32Array(CHUNK_NUMBERS * Math.ceil(kept.length / CULL_GROUP));
-  const geometries = shares.map((share) => share.geometry);
-  const harmonics = shares.map((share) => share.sh);
-  const reaches = shares.map((share) => share.reaches);
-  for (let k = 0; k < kept.length; k++) {
-    const place = places[kept[k]];
-    const share = place >>> SHIFT;
-    const i = place & MASK;
-    copy(geometries[share], GEOMETRY_WORDS * i, geometry, GEOMETRY_WORDS * k, GEOMETRY_WORDS);
-    copy(harmonics[share], shStride * i, sh, shStride * k, shStride);
-    if (moved) for (let axis = 0; axis < 3; axis++) floats[GEOMETRY_WORDS * k + axis] = moved[3 * kept[k] + axis];
+  for (let k = 0; k < kept.length; k++)
     grow(
       chunks,
       CHUNK_NUMBERS * Math.floor(k / CULL_GROUP),
       floats,
       GEOMETRY_WORDS * k,
-      reaches[share][i],
+      reaches[k],
       k % CULL_GROUP === 0,
     );
-  }
   return { geometry, sh, chunks };
+}
+
+/** In place of the number of a splat that is not kept. */
+const LEFT_OUT = 0xffffffff;
+
+/** Copies rows of words, row i to row `targets[i]`. */
+function spread(from: Uint32Array, targets: Uint32Array, to: Uint32Array, stride: number, count: number): void {
+  for (let i = 0; i < count; i++) {
+    if (targets[i] === LEFT_OUT) continue;
+    const [start, at] = [stride * i, stride * targets[i]];
+    for (let k = 0; k < stride; k++) to[at + k] = from[start + k];
+  }
 }
 
 /** Takes another splat into a chunk: see `boundChunks`. */
@@ -202,8 +241,4 @@ function grow(
     if (isFirst || x > chunks[at + 4 + axis]) chunks[at + 4 + axis] = x;
   }
   if (reach > chunks[at + 3]) chunks[at + 3] = reach;
-}
-
-function copy(from: Uint32Array, start: number, to: Uint32Array, at: number, count: number): void {
-  for (let k = 0; k < count; k++) to[at + k] = from[start + k];
 }

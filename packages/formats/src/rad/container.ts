@@ -1,0 +1,121 @@
+import { asciiOf, grouped, startsWith, viewOf } from '../bytes.js';
+import { damaged } from '../faults.js';
+import { isObject, parseJson, show, type Json } from '../json.js';
+import type { SceneSource } from '../scene-format.js';
+import { noParts } from '../readers/sog.js';
+
+const MAX_JSON_BYTES = 1 << 24;
+/** Signature and length of the description. */
+const START_BYTES = 8;
+
+/** One property of the splats of a chunk, as it is stored. */
+export interface RadProperty {
+  readonly name: string;
+  readonly encoding: string;
+  readonly isDeflated: boolean;
+  readonly bytes: Uint8Array;
+  readonly min: number;
+  readonly max: number;
+}
+
+/** Splats that follow one another. */
+export interface RadChunk {
+  /** What error messages call it. */
+  readonly where: string;
+  readonly count: number;
+  /** Degree of the spherical harmonics, 0 to 3. */
+  readonly degree: number;
+  /** Splats are the nodes of a tree: those without children are the finest level. */
+  readonly isTree: boolean;
+  /** Entries of the file's palette of harmonics, where it tells. */
+  readonly paletteCount: number | undefined;
+  readonly properties: readonly RadProperty[];
+}
+
+/** The chunks of a RAD file in their order, those too that are files of their own. A file may be one chunk alone. */
+export async function* chunksOf(source: SceneSource): AsyncGenerator<RadChunk> {
+  const { bytes, name, budget } = source;
+  if (startsWith(bytes, 'RADC')) {
+    yield chunkIn(source, bytes, name);
+    return;
+  }
+  const { json, end } = descriptionAt(source, bytes, 'RAD0', name);
+  const { type, version, chunks, shCodeCount } = json;
+  const entries = shCodeCount === undefined ? undefined : count(shCodeCount, `${name}, shCodeCount`);
+  if (version !== 1 || type !== 'gsplat')
+    throw damaged(`${name}, version`, 'version 1 of type gsplat', show([version, type]), 'decode/unsupported');
+  if (!Array.isArray(chunks)) throw damaged(`${name}, chunks`, 'a list', show(chunks), 'decode/header');
+  for (const [k, chunk] of chunks.entries()) {
+    const where = `${name}, chunks[${k}]`;
+    if (!isObject(chunk)) throw damaged(where, 'an object', show(chunk), 'decode/header');
+    const { filename, offset, bytes: length } = chunk;
+    if (typeof filename === 'string') {
+      const path = `${name}, ${filename}`;
+      yield chunkIn(source, await (source.openPart ?? noParts(name, 'scene.rad'))(filename), path, entries);
+      continue;
+    }
+    const first = end + count(offset, `${where}.offset`);
+    const last = first + count(length, `${where}.bytes`);
+    if (last > bytes.length) throw damaged(where, `${grouped(last)} bytes`, grouped(bytes.length), 'decode/truncated');
+    // A list may name the same chunk again and again.
+    budget.take(length as number, where);
+    yield chunkIn(source, bytes.subarray(first, last), where, entries);
+  }
+}
+
+function chunkIn({ budget }: SceneSource, bytes: Uint8Array, where: string, paletteCount?: number): RadChunk {
+  const { json, end } = descriptionAt({ budget }, bytes, 'RADC', where);
+  const { version, maxSh = 0, lodTree = false, properties } = json;
+  if (version !== 1) throw damaged(`${where}, version`, 'version 1', show(version), 'decode/unsupported');
+  if (![0, 1, 2, 3].includes(maxSh as number)) throw damaged(`${where}, maxSh`, '0 to 3', show(maxSh));
+  if (!Array.isArray(properties)) throw damaged(`${where}, properties`, 'a list', show(properties), 'decode/header');
+  // Behind the description stands the length of the properties.
+  const payload = end + 8;
+  return {
+    where,
+    count: count(json.count, `${where}, count`),
+    degree: maxSh as number,
+    isTree: lodTree === true,
+    paletteCount,
+    properties: properties.map((property, k) => propertyOf(property, bytes, payload, `${where}, properties[${k}]`)),
+  };
+}
+
+function propertyOf(property: unknown, bytes: Uint8Array, payload: number, where: string): RadProperty {
+  if (!isObject(property)) throw damaged(where, 'an object', show(property), 'decode/header');
+  const { property: name, encoding, compression, min = 0, max = 1 } = property;
+  const first = payload + count(property.offset, `${where}.offset`);
+  const last = first + count(property.bytes, `${where}.bytes`);
+  if (last > bytes.length) throw damaged(where, `${grouped(last)} bytes`, grouped(bytes.length), 'decode/truncated');
+  if (compression !== undefined && compression !== 'gz')
+    throw damaged(`${where}.compression`, '"gz" or nothing', show(compression), 'decode/unsupported');
+  if (typeof name !== 'string' || typeof encoding !== 'string')
+    throw damaged(where, 'names of a property and its encoding', show([name, encoding]), 'decode/header');
+  if (![min, max].every(Number.isFinite)) throw damaged(where, 'finite bounds', show([min, max]));
+  return {
+    ...{ name, encoding, isDeflated: compression === 'gz' },
+    ...{ bytes: bytes.subarray(first, last), min: min as number, max: max as number },
+  };
+}
+
+/** A description in JSON behind a signature and its length; padded to a multiple of 8 bytes. */
+function descriptionAt(
+  { budget }: Pick<SceneSource, 'budget'>,
+  bytes: Uint8Array,
+  signature: string,
+  name: string,
+): { json: Json; end: number } {
+  if (!startsWith(bytes, signature))
+    throw damaged(name, signature, JSON.stringify(asciiOf(bytes, 0, 4)), 'decode/header');
+  const end = START_BYTES + (bytes.length < START_BYTES ? 0 : viewOf(bytes).getUint32(4, true));
+  if (bytes.length < Math.max(START_BYTES, end))
+    throw damaged(name, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/truncated');
+  const json = parseJson({ bytes: bytes.subarray(START_BYTES, end), name, budget }, MAX_JSON_BYTES);
+  return { json, end: START_BYTES + 8 * Math.ceil((end - START_BYTES) / 8) };
+}
+
+function count(value: unknown, where: string): number {
+  if (!Number.isSafeInteger(value) || (value as number) < 0)
+    throw damaged(where, 'a whole number, 0 or more', show(value), 'decode/header');
+  return value as number;
+}

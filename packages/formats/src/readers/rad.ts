@@ -1,0 +1,148 @@
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { grouped } from '../bytes.js';
+import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
+import { damaged } from '../faults.js';
+import { chunksOf, type RadChunk, type RadProperty } from '../rad/container.js';
+import { contentOf, valuesOf } from '../rad/properties.js';
+import type { SceneSource } from '../scene-format.js';
+
+/** Numbers of a splat's harmonics in each band above the constant one, and where they begin among all. */
+const BANDS = [
+  { size: 9, first: 3 },
+  { size: 15, first: 12 },
+  { size: 21, first: 27 },
+] as const;
+
+/**
+ * Reads Spark's RAD (`rad.rs` of spark-lib, version 1): chunks of splats whose properties are columns, each with an encoding of its own and deflated; harmonics of each splat or out of a
+ * palette; chunks in the file or beside it. Of a tree of levels the leaves are read: the splats that it was built of.
+ */
+export async function readRad(source: SceneSource): Promise<GaussianCloud> {
+  const chunks: { chunk: RadChunk; leaves: Uint32Array }[] = [];
+  let count = 0;
+  let degree = 0;
+  for await (const chunk of chunksOf(source)) {
+    source.signal?.throwIfAborted();
+    const leaves = leavesOf(chunk, source);
+    chunks.push({ chunk, leaves });
+    count += leaves.length;
+    degree = Math.max(degree, chunk.degree);
+  }
+  const cloud = allocateCloud(count, degree as ShDegree, source);
+  const palette = paletteIn(
+    chunks.map(({ chunk }) => chunk),
+    degree,
+    source,
+  );
+  let at = 0;
+  for (const { chunk, leaves } of chunks) {
+    source.signal?.throwIfAborted();
+    fill(cloud, at, chunk, leaves, palette, source);
+    at += leaves.length;
+  }
+  return cloud;
+}
+
+/** Numbers of the splats without children. */
+function leavesOf(chunk: RadChunk, { budget }: SceneSource): Uint32Array {
+  const children = chunk.isTree ? find(chunk, 'child_count') : undefined;
+  // Whatever a chunk says of its number, it has as many bytes of alpha, deflated.
+  budget.take(8 * chunk.count, chunk.where);
+  const counts = children && valuesOf(children, 1, chunk.count, { budget, name: chunk.where });
+  const leaves = new Uint32Array(chunk.count);
+  let kept = 0;
+  for (let i = 0; i < chunk.count; i++) if (!counts?.[i]) leaves[kept++] = i;
+  return leaves.slice(0, kept);
+}
+
+const find = ({ properties }: RadChunk, name: string): RadProperty | undefined =>
+  properties.find((property) => property.name === name);
+
+/** Harmonics that splats name by a label: each band's numbers, entry by entry. */
+type Palette = readonly (Float32Array | undefined)[];
+
+/** It stands in one of the chunks, the first as a rule. */
+function paletteIn(chunks: readonly RadChunk[], degree: number, { budget, name }: SceneSource): Palette {
+  return BANDS.slice(0, degree).map(({ size }, band) => {
+    for (const chunk of chunks) {
+      const codes = find(chunk, `sh${band + 1}_code`);
+      if (codes) return valuesOf(codes, size, chunk.paletteCount, { budget, name: `${name}, palette` });
+    }
+  });
+}
+
+/** Reads the leaves of a chunk into a cloud, from splat `at` on. */
+function fill(
+  cloud: DraftCloud,
+  at: number,
+  chunk: RadChunk,
+  leaves: Uint32Array,
+  palette: Palette,
+  { budget }: SceneSource,
+): void {
+  const { where } = chunk;
+  const read = (name: string, size: number): Float32Array => {
+    const property = find(chunk, name);
+    if (!property) throw damaged(where, `the property ${name}`, 'none', 'decode/header');
+    return valuesOf(property, size, chunk.count, { budget, name: where });
+  };
+  /** Columns of the leaves, into rows of `stride` numbers from `offset` on. */
+  const copy = (from: Float32Array, size: number, to: Float32Array, stride: number, offset = 0): void => {
+    for (let k = 0; k < leaves.length; k++)
+      for (let n = 0; n < size; n++) to[stride * (at + k) + offset + n] = from[size * leaves[k] + n];
+  };
+  copy(read('center', 3), 3, cloud.positions, 3);
+  copy(read('scales', 3), 3, cloud.scales, 3);
+  copy(read('alpha', 1), 1, cloud.opacities, 1);
+  copy(quaternionsOf(chunk, budget), 4, cloud.rotations, 4);
+  const stride = 3 * shCoefficientCount(cloud.shDegree);
+  copy(
+    read('rgb', 3).map((value) => (value - 0.5) / SH_C0),
+    3,
+    cloud.sh,
+    stride,
+  );
+  const labels = find(chunk, 'sh_label') && palette.some(Boolean) ? read('sh_label', 1) : undefined;
+  BANDS.slice(0, chunk.degree).forEach(({ size, first }, band) => {
+    const codes = palette[band];
+    if (!labels || !codes) return copy(read(`sh${band + 1}`, size), size, cloud.sh, stride, first);
+    const entries = codes.length / size;
+    for (let k = 0; k < leaves.length; k++) {
+      const entry = labels[leaves[k]];
+      if (entry >= entries) throw damaged(`${where}, sh_label`, `labels below ${grouped(entries)}`, grouped(entry));
+      for (let n = 0; n < size; n++) cloud.sh[stride * (at + k) + first + n] = codes[size * entry + n];
+    }
+  });
+}
+
+/** As (w, x, y, z): of an axis in an octahedron and half an angle, in 8 bits each, or of x, y and z. */
+function quaternionsOf(chunk: RadChunk, budget: SceneSource['budget']): Float32Array {
+  const { where, count } = chunk;
+  const property = find(chunk, 'orientation');
+  if (!property) throw damaged(where, 'the property orientation', 'none', 'decode/header');
+  budget.take(16 * count, where);
+  const quaternions = new Float32Array(4 * count);
+  if (property.encoding === 'oct88r8') {
+    const codes = contentOf(property, 3 * count, `${where}, orientation`, budget);
+    for (let i = 0; i < count; i++) unfold(codes, 3 * i, quaternions, 4 * i);
+    return quaternions;
+  }
+  const vectors = valuesOf(property, 3, count, { budget, name: where });
+  for (let i = 0; i < count; i++) {
+    const [x, y, z] = vectors.subarray(3 * i, 3 * i + 3);
+    quaternions.set([Math.sqrt(Math.max(0, 1 - x * x - y * y - z * z)), x, y, z], 4 * i);
+  }
+  return quaternions;
+}
+
+/** An octahedral direction (Meyer et al. 2010), and an angle in 255ths of a half turn. */
+function unfold(codes: Uint8Array, from: number, quaternions: Float32Array, to: number): void {
+  const [u, v] = [(2 * codes[from]) / 255 - 1, (2 * codes[from + 1]) / 255 - 1];
+  const z = 1 - Math.abs(u) - Math.abs(v);
+  const fold = Math.max(0, -z);
+  const x = u >= 0 ? u - fold : u + fold;
+  const y = v >= 0 ? v - fold : v + fold;
+  const half = (codes[from + 2] / 255) * (Math.PI / 2);
+  const share = Math.sin(half) / Math.hypot(x, y, z);
+  quaternions.set([Math.cos(half), share * x, share * y, share * z], to);
+}

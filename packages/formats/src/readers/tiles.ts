@@ -1,0 +1,117 @@
+import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { checkedPart } from '../foreign-signatures.js';
+import { grouped } from '../bytes.js';
+import { damaged, warn } from '../faults.js';
+import { multiply, type Affine } from '../gltf/nodes.js';
+import { mergeClouds } from '../merge-clouds.js';
+import type { SceneSource } from '../scene-format.js';
+import { contentsAt, type TileContent } from '../tileset.js';
+import { movedCloud } from '../transform/moved-cloud.js';
+import { isTileset, readGltf } from './gltf.js';
+import { noParts } from './sog.js';
+
+/** Between a cloud's frame (x right, y down, z forward) and that of tiles (z up), by way of glTF's (y up). */
+const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
+/** Tilesets within tilesets at most. */
+const MAX_NESTED = 16;
+/** From the middle of the Earth a tileset is georeferenced, in metres. */
+const ON_EARTH = 1e6;
+
+/**
+ * Reads a tileset of 3D Tiles whose tiles are glTF with splats, as a whole at one level of detail (`source.level`, 0 the finest). Tilesets on the Earth have the direction away from its
+ * middle as `hints.up`. Tiles of other kinds are left out with a warning.
+ */
+export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
+  const level = source.level === 'all' ? 0 : (source.level ?? 0);
+  const clouds: GaussianCloud[] = [];
+  let others = 0;
+  for await (const { toTileset, uri, bytes } of filesOf(source, level)) {
+    source.signal?.throwIfAborted();
+    const { budget, signal } = source;
+    const name = `${source.name}, ${uri}`;
+    const folder = folderOf(uri);
+    const openPart = (path: string, query?: string): Promise<Uint8Array> => opened(source, folder + path, query);
+    const cloud = await readGltf({ bytes, name, budget, signal, openPart }).catch((error: unknown) => {
+      if (error instanceof GaussianSplatError && error.code === 'decode/not-splats') return undefined;
+      throw error;
+    });
+    // Both turns are their own inverse.
+    if (cloud) clouds.push(movedCloud(cloud, multiply(TO_CLOUD, multiply(toTileset, TO_CLOUD))));
+    else others++;
+  }
+  if (clouds.length === 0)
+    throw damaged(
+      source.name,
+      'tiles with splats (KHR_gaussian_splatting)',
+      `a tileset of 3D Tiles with ${grouped(others)} tiles without`,
+      'decode/unsupported',
+    );
+  const whole = mergeClouds(
+    clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
+    source,
+  );
+  const up = upAt(whole.origin);
+  if (up) whole.hints = { ...whole.hints, up };
+  if (others > 0) warn(whole, `${grouped(others)} tiles without splats are left out.`);
+  return whole;
+}
+
+type TileFile = TileContent & { readonly bytes: Uint8Array };
+
+/** The glTFs of a tileset, those too of tilesets that it names. */
+async function* filesOf(source: SceneSource, level: number): AsyncGenerator<TileFile> {
+  const { name, budget } = source;
+  const left: (TileContent & { readonly depth: number })[] = [];
+  /** How often each file will be named still, and those that will. */
+  const uses = new Map<string, number>();
+  const kept = new Map<string, Uint8Array>();
+  const list = (contents: readonly TileContent[], depth: number): void => {
+    for (const content of [...contents].reverse()) {
+      left.push({ ...content, depth });
+      uses.set(content.uri, (uses.get(content.uri) ?? 0) + 1);
+    }
+  };
+  list(contentsAt(source, level), 0);
+  for (let content = left.pop(); content; content = left.pop()) {
+    const { uri, toTileset, depth } = content;
+    const [path, query = ''] = uri.split(/(?=\?)/, 2);
+    const where = `${name}, ${uri}`;
+    // Named again and again a file is fetched once, and charged each time.
+    const again = kept.get(uri);
+    budget.take(again?.length ?? 0, where);
+    const bytes = again ?? (await checkedPart(await opened(source, decoded(path), query), where));
+    uses.set(uri, uses.get(uri)! - 1);
+    if (uses.get(uri)) kept.set(uri, bytes);
+    else kept.delete(uri);
+    if (!isTileset(bytes)) {
+      yield { uri, toTileset, bytes };
+      continue;
+    }
+    if (depth >= MAX_NESTED)
+      throw damaged(where, `tilesets at most ${MAX_NESTED} deep`, 'deeper ones', 'decode/header');
+    const inner = contentsAt({ bytes, name: where, budget }, level, toTileset);
+    list(
+      inner.map((one) => ({ ...one, uri: folderOf(path) + one.uri })),
+      depth + 1,
+    );
+  }
+}
+
+const opened = ({ openPart, name }: SceneSource, path: string, query?: string): Promise<Uint8Array> =>
+  (openPart ?? noParts(name, 'scene.zip'))(path, query);
+
+const folderOf = (uri: string): string => uri.replace(/\?.*$/, '').replace(/[^/]*$/, '');
+
+function decoded(path: string): string {
+  try {
+    return decodeURIComponent(path);
+  } catch {
+    return path;
+  }
+}
+
+/** Away from the middle of the Earth, for a cloud at its surface. */
+function upAt(origin: Vector3): Vector3 | undefined {
+  const radius = Math.hypot(...origin);
+  return radius < ON_EARTH ? undefined : (origin.map((x) => x / radius) as unknown as Vector3);
+}
