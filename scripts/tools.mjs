@@ -8,6 +8,7 @@ import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { tsImport } from 'tsx/esm/api';
 import { ensureDependencies } from './lib/prepare.mjs';
 import { must } from './lib/run.mjs';
 
@@ -59,6 +60,23 @@ function distance(found, source) {
   return { place, opacity };
 }
 
+const sparkVersion = () => JSON.parse(readFileSync('node_modules/@sparkjsdev/spark/package.json', 'utf8')).version;
+
+/** A RAD as the SPZ that Spark makes of it. */
+async function transcodedBySpark(rad) {
+  const { transcodeSpz } = await import('@sparkjsdev/spark');
+  const inputs = [{ fileBytes: rad, fileType: 'rad' }];
+  // Its module says nothing of when its WebAssembly is there.
+  for (let tries = 0; ; tries++) {
+    try {
+      return (await transcodeSpz({ inputs, maxSh: 3 })).fileBytes;
+    } catch (error) {
+      if (tries > 50 || !/undefined/.test(error.message)) throw error;
+      await new Promise((resolve) => setTimeout(resolve, 100));
+    }
+  }
+}
+
 const rows = [];
 async function judge(tool, name) {
   const found = await readScene(readFileSync(at(name)), { name });
@@ -100,6 +118,14 @@ try {
   const stream = new Response(readFileSync(at('source.ply'))).body;
   writeFileSync(at('spz-js.spz'), new Uint8Array(await serializeSpz(await loadPly(stream))));
   await judge(`spz-js ${versionOf('spz-js')}`, 'spz-js.spz');
+  // The tests' writer of RAD: what Spark's decoder makes of it, and what our reader does.
+  const { writeRad } = await tsImport('../tests/formats/support/rad-writer.ts', import.meta.url);
+  const sh = Float32Array.from({ length: 48 * COUNT }, (_, k) => 0.3 * Math.sin(k));
+  const rad = new Uint8Array(writeRad({ ...source, sh, shDegree: 3 }, { chunkSize: 128 })['scene.rad']);
+  writeFileSync(at('a.rad'), rad);
+  await judge('after spark-lib', 'a.rad');
+  writeFileSync(at('a-by-spark.spz'), await transcodedBySpark(rad));
+  await judge(`spark ${sparkVersion()}`, 'a-by-spark.spz');
 } finally {
   rmSync(folder, { recursive: true, force: true });
 }

@@ -2,19 +2,16 @@
  * `npm run lab:bytes`: bytes against accuracy of scene files, ours and others', on the captured scenes of ../shared/data. Each is read, drawn in held-out views, and held against the scene that it was made of.
  * What takes long to make is kept in --work and taken from there the next time.
  */
-import { spawnSync } from 'node:child_process';
 import { existsSync, mkdirSync, readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
-import { basename, join, resolve } from 'node:path';
+import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf } from '@gaussian-splat/core';
 import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/economise';
-import { readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
-import { decodePage } from '@gaussian-splat/renderer/tools';
-import { cloudOfChunks } from '@gaussian-splat/economise/pages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
+import { halfTurned, make, own, read, readFolder, timed, TRANSFORM } from './files.mjs';
 import { writeSplat } from './splat.mjs';
 
 const USAGE = `usage: npm run lab:bytes -- [options]
@@ -30,9 +27,6 @@ const USAGE = `usage: npm run lab:bytes -- [options]
 
 /** Bytes a second of 20 Mbit/s. */
 const RATE = 2.5e6;
-/** The tool of others that writes their formats, by npx. */
-const TRANSFORM = '@playcanvas/splat-transform@3.7.0';
-
 const SCENES = {
   'st-peter': { source: 'scenes/st-peter.sog', files: { 'SOG (its own)': 'scenes/st-peter.sog' } },
   playbot3: {
@@ -66,76 +60,6 @@ const { values } = parseArgs({
     help: { type: 'boolean' },
   },
 });
-
-/** Runs a command that makes a file, unless that is there; false where it fails. */
-function make(path, command, args) {
-  if (existsSync(path) || values.kept) return existsSync(path);
-  console.log(`  ${basename(path)} ...`);
-  const { status, stderr } = spawnSync(command, args, { encoding: 'utf8', cwd: root });
-  if (status === 0) return true;
-  console.log(`  not made: ${(stderr ?? '').trim().split('\n').at(-1)}`);
-  return false;
-}
-
-const own = (...args) => [join(root, 'packages/cli/bin/gaussian-splat.mjs'), ...args];
-
-/** Signs of coefficients in a half turn about x. */
-const HALF_TURN = [1, -1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1];
-
-/** The cloud turned by half a turn about x: splat-transform 3.7.0 writes SPZ in the frame of PLY (docs/decisions/0022). */
-function halfTurned(cloud) {
-  const numbers = 3 * (cloud.shDegree + 1) ** 2;
-  return {
-    ...cloud,
-    positions: cloud.positions.map((value, k) => (k % 3 === 0 ? value : -value)),
-    rotations: cloud.rotations.map((_, k, all) => {
-      const [w, x, y, z] = all.subarray(k - (k % 4), k - (k % 4) + 4);
-      return [-x, w, -z, y][k % 4];
-    }),
-    sh: cloud.sh.map((value, k) => HALF_TURN[Math.floor((k % numbers) / 3)] * value),
-  };
-}
-
-async function read(path) {
-  const openPart = async (part) => new Uint8Array(readFileSync(join(path, '..', part)));
-  return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openPart });
-}
-
-/** The least of three times, ms, and what was read. */
-async function timed(work) {
-  let [least, found] = [Infinity, undefined];
-  for (let k = 0; k < 3; k++) {
-    const start = performance.now();
-    found = await work();
-    least = Math.min(least, performance.now() - start);
-  }
-  return [least, found];
-}
-
-/** Pages of a folder, decoded: the finest of them as a cloud, and how many bytes there are of all and of the first. */
-async function readFolder(folder) {
-  const manifest = JSON.parse(readFileSync(join(folder, 'detail.json'), 'utf8'));
-  const { coding, shDegree, trees } = manifest;
-  const [{ pages }] = trees;
-  const isParent = new Set(pages.flatMap(({ parent }) => (parent ? [`${parent}`] : [])));
-  const parts = [];
-  for (const [p, { file, chunks, upper }] of pages.entries()) {
-    const bytes = new Uint8Array(readFileSync(join(folder, file)));
-    const words = new Uint32Array(await decodePage(file, bytes, { chunks, upper, shDegree, coding }));
-    // The finest: nothing is below them, in this file or in another.
-    const leaves = Array.from({ length: chunks }, (_, c) => c).filter(
-      (c) => !isParent.has(`${[p, c]}`) && 4 * c >= chunks - upper,
-    );
-    parts.push({ words, of: chunks, chunks: leaves });
-  }
-  const sizes = pages.map(({ file }) => statSync(join(folder, file)).size);
-  const index = statSync(join(folder, 'detail.json')).size;
-  return {
-    cloud: cloudOfChunks(manifest, parts),
-    bytes: index + sizes.reduce((sum, size) => sum + size, 0),
-    first: index + sizes[0],
-  };
-}
 
 async function measure(scene, { source, files }, device) {
   const path = (file) => join(values.data, file);
@@ -175,7 +99,7 @@ async function measure(scene, { source, files }, device) {
   for (const [name, extension] of Object.entries(TRANSFORMED)) {
     if (Object.keys(files).some((other) => other.startsWith(name))) continue;
     const args = ['--yes', TRANSFORM, '-q', '-w', '-g', 'cpu', path(source), made(extension)];
-    if (make(made(extension), 'npx', args))
+    if (make(made(extension), 'npx', args, values.kept))
       await file(name, false, made(extension), extension === 'spz' ? halfTurned : undefined);
   }
   writeFileSync(made('splat'), writeSplat(cloud));
@@ -193,6 +117,7 @@ async function measure(scene, { source, files }, device) {
         folder,
         process.execPath,
         own('detail', path(source), '--out', folder, '--min-db', String(dB), '--scored', values.scored),
+        values.kept,
       )
     ) {
       const [ms, found] = await timed(() => readFolder(folder));
@@ -200,7 +125,7 @@ async function measure(scene, { source, files }, device) {
     }
     const smaller = made(`own-${dB}.sog`);
     const options = ['--min-db', String(dB), '--scored', values.scored, '--out', smaller];
-    if (make(smaller, process.execPath, own('economise', path(source), ...options)))
+    if (make(smaller, process.execPath, own('economise', path(source), ...options), values.kept))
       await file(`SOG, ours, ${dB} dB`, true, smaller);
   }
   evaluator.destroy();
