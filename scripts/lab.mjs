@@ -15,6 +15,7 @@ const IN_NODE = {
   fuzz: ['--import', 'tsx', 'tests/stability/fuzz/run-fuzz.ts'],
   'detail-chart': ['scripts/charts/detail.mjs'],
   bytes: ['scripts/bytes/run-bytes.mjs'],
+  gate: ['scripts/gate/run-gate.mjs'],
   sequence: ['scripts/bytes/run-sequence.mjs'],
 };
 
