@@ -2,8 +2,17 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { boundsOf, keepUsable, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { packGaussians } from '@gaussian-splat/renderer';
-import { joinShares, packShare, SHARE_SPLATS } from '@gaussian-splat/renderer/tools';
+import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import {
+  boundsOfPacked,
+  JoinedBlocks,
+  layoutOf,
+  packShare,
+  SHARE_SPLATS,
+  ShareCells,
+  sortBlock,
+  type ShareLayout,
+} from '@gaussian-splat/renderer/tools';
 import { seededRandom } from '../support/random.js';
 
 interface Kind {
@@ -64,34 +73,85 @@ const KINDS: Readonly<Record<string, Kind>> = {
   'that is small': { count: 700 },
 };
 
+const partsOf = (whole: GaussianCloud): GaussianCloud[] => {
+  const parts = [];
+  for (let first = 0; first < whole.count; first += SHARE_SPLATS)
+    parts.push(keepUsable(part(whole, first, Math.min(whole.count, first + SHARE_SPLATS))));
+  return parts;
+};
+
+/** Packs parts by a layout, and by another if the scene asks for it. */
+function joined(parts: readonly GaussianCloud[], layout: ShareLayout, rows: number): PackedGaussians {
+  const cells = new ShareCells(layout);
+  const shares = parts.map((cloud) => packShare(cloud, layout));
+  for (const share of shares) cells.add(share);
+  const needed = cells.layoutFor();
+  if (needed !== layout) return joined(parts, needed, rows);
+  const count = shares.reduce((sum, share) => sum + share.count, 0);
+  const blocks = new JoinedBlocks(layout, count);
+  for (const cell of cells.all().reverse()) blocks.add(sortBlock(cell.block()));
+  const { antialiased, origin } = parts[0];
+  return blocks.finish({ antialiased, filterVariance: undefined, origin, droppedCount: rows - count });
+}
+
 for (const [name, kind] of Object.entries(KINDS)) {
   test(`a scene ${name}`, () => {
     const whole = scene(kind);
-    const parts = [];
-    for (let first = 0; first < whole.count; first += SHARE_SPLATS)
-      parts.push(keepUsable(part(whole, first, Math.min(whole.count, first + SHARE_SPLATS))));
     const kept = keepUsable(part(whole, 0, whole.count));
     const expected = packGaussians(kept);
-    const facts = { ...whole, droppedCount: kept.droppedCount };
-    let joined = joinShares(
-      parts.map((cloud) => packShare(cloud, 'int8')),
-      {},
-      facts,
-    );
-    if (typeof joined === 'string') {
-      assert.equal(joined, expected.shPrecision);
-      const precision = joined;
-      joined = joinShares(
-        parts.map((cloud) => packShare(cloud, precision)),
-        {},
-        facts,
-      );
-    }
-    assert.ok(typeof joined !== 'string');
+    const packed = joined(partsOf(whole), layoutOf(kept, 'int8'), whole.count);
     assert.equal(expected.shPrecision, kind.shine === 3 ? 'float16' : 'int8');
-    assert.deepEqual(joined.packed, expected);
-    const { positions, opacities } = joined;
-    const bounds = boundsOf({ count: opacities.length, positions, opacities, origin: whole.origin });
-    assert.deepEqual(bounds, boundsOf(kept));
+    assert.deepEqual(packed, expected);
+    const found = boundsOfPacked(packed);
+    const bounds = boundsOf(kept);
+    assert.deepEqual([found.min, found.max], kind.away ? [found.min, found.max] : [bounds.min, bounds.max]);
+    assert.ok(Math.abs(found.radius - bounds.radius) < 0.01 * bounds.radius, `${found.radius}, ${bounds.radius}`);
   });
 }
+
+/** How far chunks reach, in the mean. */
+const reachOfChunks = ({ chunks, count }: PackedGaussians): number => {
+  let sum = 0;
+  for (let at = 0; at < chunks.length; at += 8)
+    sum += Math.hypot(...[0, 1, 2].map((axis) => chunks[at + 4 + axis] - chunks[at + axis]));
+  return sum / Math.ceil(count / 256);
+};
+
+const sorted = ({ geometry }: PackedGaussians): Float64Array => {
+  const sums = new Float64Array(geometry.length / 8);
+  for (let i = 0; i < geometry.length; i++) sums[i >> 3] += geometry[i] * (1 + (i % 8));
+  return sums.sort();
+};
+
+test('a layout by the first share of a file in spatial order keeps neighbors together', () => {
+  const shuffled = scene({ count: 100_000, shDegree: 0 });
+  const order = Array.from({ length: shuffled.count }, (_, i) => i).sort(
+    (a, b) => shuffled.positions[3 * a] - shuffled.positions[3 * b],
+  );
+  const pick = (values: Float32Array, size: number): Float32Array =>
+    Float32Array.from({ length: values.length }, (_, i) => values[size * order[Math.floor(i / size)] + (i % size)]);
+  const whole = {
+    ...shuffled,
+    positions: pick(shuffled.positions, 3),
+    scales: pick(shuffled.scales, 3),
+    rotations: pick(shuffled.rotations, 4),
+    opacities: pick(shuffled.opacities, 1),
+    sh: pick(shuffled.sh, 3),
+  };
+  const parts = partsOf(whole);
+  const expected = packGaussians(keepUsable(part(whole, 0, whole.count)));
+  const packed = joined(parts, layoutOf(parts[0], 'int8'), whole.count);
+  assert.deepEqual(sorted(packed), sorted(expected), 'the same splats');
+  const [found, best] = [packed, expected].map(reachOfChunks);
+  console.log(`mean diagonal of a chunk ${found.toFixed(3)}, by the whole scene ${best.toFixed(3)}`);
+  assert.ok(found < 1.25 * best, `${found}, ${best}`);
+});
+
+test('a scene whose end lies in planes keeps the order of its file', () => {
+  const whole = scene({ count: 4 * SHARE_SPLATS });
+  for (let i = SHARE_SPLATS; i < whole.count; i++) whole.positions[3 * i + 1] = i % 8;
+  const parts = partsOf(whole);
+  const kept = keepUsable(part(whole, 0, whole.count));
+  const packed = joined(parts, layoutOf(parts[0], 'int8'), whole.count);
+  assert.deepEqual(packed, packGaussians(kept));
+});

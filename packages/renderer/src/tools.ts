@@ -47,12 +47,19 @@ export { boundsOfWorld } from './world-bounds.js';
 export { type Threads } from './stages/plan.js';
 export { bytesPerSplat, type Reservation } from './memory-ledger.js';
 export {
-  joinShares,
+  boundsOfPacked,
+  JoinedBlocks,
+  layoutOf,
   packShare,
   SHARE_SPLATS,
-  type JoinedShares,
+  ShareCells,
+  sortBlock,
   type PackedShare,
+  type ShareBlock,
+  type ShareCell,
   type ShareFacts,
+  type ShareLayout,
+  type SortedBlock,
 } from './pack/shares.js';
 export { readBack, readBackWith, type ReadPart } from './gpu/read-back.js';
 export { sortByKey } from './pack/radix-sort.js';

@@ -1,27 +1,48 @@
 /** Loaded by the worker for large PLYs: their rows are packed by several workers while the rest is on its way. */
-import { boundsOf } from '@gaussian-splat/core';
 import { MOST_DROPPED, splatRanges, type LoadLimits, type SplatRanges } from '@gaussian-splat/formats';
+import { boundsOf } from '@gaussian-splat/core';
 import { packGaussians } from '@gaussian-splat/renderer';
-import { joinShares, SHARE_SPLATS, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer/tools';
+import {
+  boundsOfPacked,
+  JoinedBlocks,
+  SHARE_SPLATS,
+  ShareCells,
+  sortBlock,
+  type ShareCell,
+  type ShareLayout,
+} from '@gaussian-splat/renderer/tools';
 import type { LoadListeners } from './load-scene.js';
-import { packRows, release, type ShareAnswer, type ShareRequest } from './pack-shares.js';
+import {
+  layoutBy,
+  packRows,
+  release,
+  type HelperAnswer,
+  type HelperRequest,
+  type ReadShare,
+  type ShareRows,
+} from './pack-shares.js';
 import { PartPreviews } from './part-previews.js';
-import type { LoadedScene, SceneRequest } from './protocol.js';
+import { buffersOf, type LoadedScene, type SceneRequest } from './protocol.js';
 
-/** Shares that a helper has at the same time: the next is there when one is done. */
-const AT_ONCE = 2;
+/** Requests that a helper has at the same time: the next is there when one is done. */
+const AT_ONCE = 3;
 /** A helper that has answered nothing for so long is not waited for any more, ms. */
 const PATIENCE_MS = 5_000;
 /** Without a helper until then, shares are packed here while bytes arrive, ms. */
 const ALONE_AFTER_MS = 500;
+/** Messages are handled that often while bytes arrive, ms. */
+const TURN_MS = 8;
 
 type Rows = NonNullable<SplatRanges['rows']>;
 
 interface Helper {
   readonly port: MessagePort;
-  /** Shares that it was given and has not answered. */
+  /** Tickets that it was given and has not answered. */
   readonly open: Set<number>;
 }
+
+/** A share that has been read. Its splats lie in their cells. */
+type Share = ReadShare & { readonly count: number };
 
 /** One PLY on its way. */
 export class LargePly {
@@ -32,16 +53,30 @@ export class LargePly {
   readonly #limits: () => LoadLimits;
   readonly #signal: AbortSignal;
   readonly #listeners: LoadListeners;
-  readonly #answers: (ShareAnswer | undefined)[];
+  /** Shares that have been read, in the order of the file; a cell takes those that follow one another. */
+  readonly #shares: (Share | undefined)[];
+  readonly #waiting = new Map<number, ReadShare>();
   readonly #helpers: Helper[] = [];
   readonly #previews: PartPreviews;
   readonly #began = performance.now();
+  /** When messages were handled last. */
+  #turned = 0;
   /** Shares below it have been handed out, or packed here. */
   #next = 0;
   /** Handed out to helpers that are gone. */
   readonly #again: number[] = [];
   #bytes: Uint8Array = new Uint8Array();
-  #precision: ShPrecision;
+  #layout: ShareLayout | undefined;
+  #cells: ShareCells | undefined;
+  /** Shares below it lie in their cells. */
+  #dealt = 0;
+  /** Cells to be put in order, by their tickets. */
+  readonly #blocks = new Map<number, ShareCell>();
+  #joined: JoinedBlocks | undefined;
+  /** Memory that helpers have given back. */
+  readonly #rooms: ArrayBuffer[] = [];
+  /** Counts the beginnings of the work. */
+  #epoch = 0;
   #wake: () => void = () => undefined;
 
   /**
@@ -82,58 +117,87 @@ export class LargePly {
     this.#limits = limits;
     this.#signal = signal;
     this.#listeners = listeners;
-    this.#precision = sh === 'auto' ? 'int8' : sh;
-    this.#answers = new Array<undefined>(Math.ceil(count / SHARE_SPLATS));
-    this.#previews = new PartPreviews(this.#answers.length, (preview) =>
+    this.#shares = new Array<undefined>(Math.ceil(count / SHARE_SPLATS));
+    this.#previews = new PartPreviews(this.#shares.length, (preview) =>
       listeners.onPreview?.({
         packed: packGaussians(preview, { sh: 'int8' }),
         bounds: { ...boundsOf(preview), up: preview.hints?.up },
       }),
     );
-    listeners.askForHelp?.(this.#answers.length, (port) => this.#addHelper(port));
+    listeners.askForHelp?.(this.#shares.length, (port) => this.#addHelper(port));
   }
 
   /** More of the file is there: all bytes so far. */
   async onArrival(bytes: Uint8Array): Promise<void> {
     // The download has begun again, perhaps of another file.
-    if (bytes.length < this.#bytes.length) this.#forget();
+    if (bytes.length < this.#bytes.length) this.#forget(undefined);
     this.#bytes = bytes;
+    await this.#findLayout();
     this.#feed();
     const isAlone = this.#helpers.length === 0 && performance.now() - this.#began > ALONE_AFTER_MS;
-    if (isAlone && this.#next < this.#arrived) await this.#packHere(this.#next++);
+    const request = isAlone ? this.#nextRequest() : undefined;
+    if (request) await this.#workHere(request);
     if (this.#listeners.onPreview) this.#previews.showIfDue();
+    // A download that never has to wait keeps the answers of helpers from this thread.
+    if (this.#helpers.length > 0 && performance.now() - this.#turned > TURN_MS) {
+      await turn();
+      this.#turned = performance.now();
+    }
   }
 
-  /** The scene, once all bytes are there; undefined where something is wrong with them, which those who read the whole file can say. */
+  /** The scene, once all bytes are there; undefined if something is wrong with them, which the reader of the whole file can say. */
   async finish(bytes: Uint8Array): Promise<LoadedScene | undefined> {
     this.#bytes = bytes;
-    if (this.#arrived < this.#answers.length) return undefined;
+    if (this.#arrived < this.#shares.length) return undefined;
     for (;;) {
-      await this.#packAll();
-      // Who reads it whole says that there is no time left.
-      if (this.#isLate) return undefined;
-      const shares = this.#answers.map((answer) => answer?.packed);
-      const first = this.#answers.find((answer) => answer?.packed);
-      if (!first || shares.includes(undefined)) return undefined;
-      const { shDegree = 0, antialiased = false, filterVariance, origin = [0, 0, 0], up, order, warnings } = first;
-      const packed = shares as PackedShare[];
-      const droppedCount = this.#count - packed.reduce((sum, { count }) => sum + count, 0);
-      // Who reads it whole says why.
-      if (droppedCount > MOST_DROPPED * this.#count) return undefined;
+      await this.#findLayout();
+      if (!this.#layout) return undefined;
+      await this.#workAll();
+      // The reader of the whole file says that there is no time left, and why too much is dropped.
+      if (this.#isLate || this.#dealt < this.#shares.length) return undefined;
+      const count = this.#shares.reduce((sum, share) => sum + (share?.count ?? 0), 0);
+      const droppedCount = this.#count - count;
+      if (count === 0 || droppedCount > MOST_DROPPED * this.#count) return undefined;
       this.#listeners.onReading?.(true);
-      const facts = { shDegree, antialiased, filterVariance, origin, droppedCount };
-      // Without the file and the shares a scene takes a third of the memory.
-      const onSettled = (): void => release(bytes);
-      const joined = joinShares(packed, { sh: this.#sh, onSettled, release }, facts);
-      if (typeof joined !== 'string') {
-        const { positions, opacities } = joined;
-        const bounds = boundsOf({ count: opacities.length, positions, opacities, origin });
-        return { packed: joined.packed, bounds: { ...bounds, up }, order, warnings };
+      const layout = this.#cells!.layoutFor(this.#sh);
+      if (layout !== this.#layout) {
+        this.#forget(layout);
+        continue;
       }
-      // Its colours need another precision than was taken for granted.
-      this.#precision = joined;
-      this.#forget();
+      // From here on nothing can fail. Without the file a scene takes a third of the memory.
+      release(bytes);
+      const joined = await this.#join(layout, count);
+      const first = this.#shares.find((share) => share?.shDegree !== undefined);
+      const { antialiased = false, filterVariance, origin = [0, 0, 0], up, order, warnings } = first ?? {};
+      const packed = joined.finish({ antialiased, filterVariance, origin, droppedCount });
+      return { packed, bounds: { ...boundsOfPacked(packed), up }, order, warnings };
     }
+  }
+
+  /** By the first share. */
+  async #findLayout(): Promise<void> {
+    if (this.#layout || this.#arrived === 0) return;
+    const precision = this.#sh === 'auto' ? 'int8' : this.#sh;
+    for (let share = 0; share < this.#arrived && !this.#layout; share++)
+      this.#layout = await layoutBy(this.#rowsOf(share), precision);
+    this.#cells = this.#layout && new ShareCells(this.#layout);
+  }
+
+  /** Has all blocks put in order. */
+  async #join(layout: ShareLayout, count: number): Promise<JoinedBlocks> {
+    const joined = (this.#joined = new JoinedBlocks(layout, count));
+    // The largest first: nobody waits for it in the end.
+    const cells = this.#cells!.all().sort((a, b) => b.count - a.count);
+    cells.forEach((cell, k) => {
+      this.#blocks.set(this.#shares.length + k, cell);
+      this.#again.push(this.#shares.length + k);
+    });
+    // The last is taken first.
+    this.#again.reverse();
+    this.#cells = undefined;
+    this.#rooms.length = 0;
+    await this.#workAll();
+    return joined;
   }
 
   get #isLate(): boolean {
@@ -145,14 +209,17 @@ export class LargePly {
   get #arrived(): number {
     const { start, byteLength } = this.#rows;
     const rows = Math.floor((this.#bytes.length - start) / byteLength);
-    return rows >= this.#count ? this.#answers.length : Math.max(0, Math.floor(rows / SHARE_SPLATS));
+    return rows >= this.#count ? this.#shares.length : Math.max(0, Math.floor(rows / SHARE_SPLATS));
   }
 
-  #forget(): void {
-    this.#answers.fill(undefined);
-    this.#again.length = 0;
-    this.#next = 0;
-    // What they still answer is of no use.
+  #forget(layout: ShareLayout | undefined): void {
+    this.#layout = layout;
+    this.#cells = layout && new ShareCells(layout);
+    this.#shares.fill(undefined);
+    this.#waiting.clear();
+    this.#again.length = this.#next = this.#dealt = 0;
+    // Answers to requests of before are ignored.
+    this.#epoch++;
     for (const { open } of this.#helpers) open.clear();
     this.#previews.forget();
   }
@@ -160,8 +227,9 @@ export class LargePly {
   #addHelper(port: MessagePort): void {
     const helper: Helper = { port, open: new Set() };
     this.#helpers.push(helper);
-    port.addEventListener('message', ({ data }: MessageEvent<ShareAnswer>) => {
-      if (helper.open.delete(data.share)) this.#keep(data);
+    port.addEventListener('message', ({ data }: MessageEvent<HelperAnswer>) => {
+      if (data.room) this.#rooms.push(data.room);
+      if (data.epoch === this.#epoch && helper.open.delete(data.ticket)) this.#take(data);
       this.#feed();
       this.#wake();
     });
@@ -179,9 +247,16 @@ export class LargePly {
     this.#wake();
   }
 
-  #keep(answer: ShareAnswer): void {
-    this.#answers[answer.share] = answer;
-    if (answer.preview) this.#previews.add(answer.share, answer.preview);
+  #take({ ticket, share, block }: HelperAnswer): void {
+    if (block) this.#joined!.add(block);
+    if (!share) return;
+    if (share.preview) this.#previews.add(ticket, share.preview);
+    this.#waiting.set(ticket, share);
+    for (let next = this.#waiting.get(this.#dealt); next; next = this.#waiting.get(++this.#dealt)) {
+      if (next.packed) this.#cells!.add(next.packed);
+      this.#shares[this.#dealt] = { ...next, packed: undefined, preview: undefined, count: next.packed?.count ?? 0 };
+      this.#waiting.delete(this.#dealt);
+    }
   }
 
   /** Gives helpers what there is. */
@@ -189,45 +264,54 @@ export class LargePly {
     for (let round = 0; round < AT_ONCE; round++)
       for (const { port, open } of this.#helpers) {
         if (open.size > round) continue;
-        const share = this.#take();
-        if (share === undefined) return;
-        open.add(share);
-        const request = this.#request(share);
-        port.postMessage(request, [request.bytes.buffer]);
+        const request = this.#nextRequest();
+        if (request === undefined) return;
+        open.add(request.ticket);
+        port.postMessage(request, buffersOf('block' in request ? request.block : request.rows));
       }
   }
 
-  #take(): number | undefined {
-    return this.#again.pop() ?? (this.#next < this.#arrived ? this.#next++ : undefined);
+  #nextRequest(): HelperRequest | undefined {
+    const epoch = this.#epoch;
+    if (!this.#layout) return undefined;
+    const ticket = this.#again.pop() ?? (this.#next < this.#arrived ? this.#next++ : undefined);
+    const cell = this.#blocks.get(ticket ?? -1);
+    if (ticket !== undefined && cell) return { ticket, epoch, block: cell.block(this.#rooms.pop()) };
+    return ticket === undefined ? undefined : { ticket, epoch, rows: this.#rowsOf(ticket), layout: this.#layout };
   }
 
   /** The file's header and the rows of a share: a PLY that has not come whole yet. */
-  #request(share: number): ShareRequest {
+  #rowsOf(share: number): ShareRows {
     const { start, byteLength } = this.#rows;
     const end = Math.min(this.#count, SHARE_SPLATS * (share + 1));
     const rows = this.#bytes.subarray(start + byteLength * SHARE_SPLATS * share, start + byteLength * end);
-    const bytes = new Uint8Array(start + rows.length);
+    const [length, room] = [start + rows.length, this.#rooms.pop()];
+    const bytes = new Uint8Array(room && room.byteLength >= length ? room : new ArrayBuffer(length), 0, length);
     bytes.set(this.#bytes.subarray(0, start));
     bytes.set(rows, start);
-    return { share, bytes, shPrecision: this.#precision, name: this.#name };
+    return { bytes, name: this.#name };
   }
 
-  async #packHere(share: number): Promise<void> {
+  async #workHere(request: HelperRequest): Promise<void> {
     this.#listeners.onReading?.(true);
-    this.#keep(await packRows(this.#request(share)));
+    const { ticket, epoch } = request;
+    if ('block' in request) this.#take({ ticket, epoch, block: sortBlock(request.block) });
+    else this.#take({ ticket, epoch, share: await packRows(request.rows, request.layout) });
   }
 
-  /** With what helpers there are, and here. */
-  async #packAll(): Promise<void> {
+  /** Does all work there is, with what helpers there are, and here. */
+  async #workAll(): Promise<void> {
     for (;;) {
       this.#signal.throwIfAborted();
-      if (this.#isLate) return;
+      if (this.#isLate && !this.#joined) return;
       this.#feed();
-      const share = this.#take();
-      if (share !== undefined) {
-        await this.#packHere(share);
+      const isHelped = this.#helpers.some(({ open }) => open.size > 0);
+      // Helpers put blocks in order; this thread has enough to do with what they answer.
+      const request = isHelped && this.#joined ? undefined : this.#nextRequest();
+      if (request) {
+        await this.#workHere(request);
         await turn();
-      } else if (this.#helpers.some(({ open }) => open.size > 0)) {
+      } else if (isHelped) {
         await this.#answerSoon();
       } else {
         return;
@@ -248,5 +332,13 @@ export class LargePly {
   }
 }
 
-/** Lets messages be heard. */
-const turn = (): Promise<void> => new Promise((resolve) => setTimeout(resolve));
+let own: MessageChannel | undefined;
+
+/** Lets messages that have come be handled. A timer would wait for 4 ms. */
+function turn(): Promise<void> {
+  const { port1, port2 } = (own ??= new MessageChannel());
+  return new Promise((resolve) => {
+    port1.onmessage = () => resolve();
+    port2.postMessage(undefined);
+  });
+}

@@ -7,7 +7,7 @@ const GROWTH = 2;
 /** Splats of a preview at most: it must be there at once. */
 const MOST_SPLATS = 50_000;
 /** Previews may take this share of the time since the load began. */
-const MAX_SHARE = 0.1;
+const MAX_SHARE = 0.05;
 
 /** Previews of a scene of which some shares have been read: some of their splats, larger to stand for the rest. */
 export class PartPreviews {

@@ -13,19 +13,35 @@ const FLAT_SHARE = 0.01;
 const LEAST_COUNT = 1024;
 
 /**
- * The given splats along the curve. A scene of planes keeps its order: its splats may have equal depths, and those are blended in the
+ * A Z-order curve through a scene, by what a sample of its splats says of each axis. The curve is logarithmic far out, so a sample from a small part of
+ * the scene serves the whole of it.
+ */
+export type Curve = readonly Axis[];
+
+/**
+ * The curve through the given splats. Undefined for a scene of planes, which keeps its order: its splats may have equal depths, and those are blended in the
  * file's order.
  * @param positions [3 N] world units
  * @param kept indices of splats; not changed
- * @param samples so many of them tell how the curve lies
+ * @param samples number of splats that are looked at
  */
-export function mortonOrder(positions: Float32Array, kept: Uint32Array, samples = SAMPLE): Uint32Array {
-  if (kept.length < LEAST_COUNT) return kept;
+export function curveThrough(positions: Float32Array, kept: Uint32Array, samples = SAMPLE): Curve | undefined {
+  if (kept.length < LEAST_COUNT) return undefined;
   const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis, samples));
-  if (axes.some(isFlat)) return kept;
+  return axes.some(isFlat) ? undefined : axes;
+}
+
+/** The place of each of the splats `kept` on a curve, a 32-bit code. */
+export function codesAlong(curve: Curve, positions: Float32Array, kept: Uint32Array): Uint32Array {
   const codes = new Uint32Array(kept.length);
-  for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], axes);
-  return sortByKey(kept, codes);
+  for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], curve);
+  return codes;
+}
+
+/** The given splats along the curve through them; as they are if they are few or lie in planes. Parameters as of {@link curveThrough}. */
+export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32Array {
+  const curve = curveThrough(positions, kept);
+  return curve ? sortByKey(kept, codesAlong(curve, positions, kept)) : kept;
 }
 
 /**

@@ -23,7 +23,7 @@ const INT8_NOISE_DB = 62;
 /** The same in every part of a scene: a picture of that part alone then has some 63 dB. */
 const INT8_PART_DB = 50;
 /** Splats of a part, neighbours where they are in packed order, and how many of them are looked at. */
-const PART = 256;
+export const PART = 256;
 const PART_SAMPLES = 8;
 
 /** What rounding to `int8` does to the colour of a splat, as a variance. */
@@ -60,7 +60,12 @@ export function choosePrecision(noiseOf: NoiseOf, kept: Uint32Array): ShPrecisio
     sum += variance;
     worst = Math.max(worst, variance);
   }
-  return sum / parts <= 10 ** (-INT8_NOISE_DB / 10) && worst <= 10 ** (-INT8_PART_DB / 10) ? 'int8' : 'float16';
+  return precisionFor(sum / parts, worst);
+}
+
+/** The precision of a scene by the mean noise of all its splats, and of those of the noisiest of its parts. */
+export function precisionFor(mean: number, worst: number): ShPrecision {
+  return mean <= 10 ** (-INT8_NOISE_DB / 10) && worst <= 10 ** (-INT8_PART_DB / 10) ? 'int8' : 'float16';
 }
 
 /** The noise of a splat of a part, in the mean of some. */

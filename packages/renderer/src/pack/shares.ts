@@ -1,244 +1,366 @@
-import { MAX_POSITION, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+/**
+ * Packing a scene by several threads. Each packs shares of its rows while the rest is on its way; splats are dealt into cells along the Z-order curve as shares come,
+ * and the cells, now blocks of the scene, are sorted by several threads again.
+ */
+import {
+  boundsOf,
+  MAX_POSITION,
+  type Bounds,
+  type GaussianCloud,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { CHUNK_NUMBERS, reachOf } from './chunks.js';
-import { mortonOrder } from './morton.js';
-import { GEOMETRY_WORDS, packGeometry, type PackedGaussians, type PackOptions } from './pack.js';
+import { codesAlong, curveThrough, isOfPlanes, type Curve } from './morton.js';
+import { GEOMETRY_WORDS, packGeometry, usableIndices, type PackedGaussians, type PackOptions } from './pack.js';
 import { recentred } from './recentre.js';
-import { BAND_SIZES, choosePrecision, CODE_NOISE, packSh, SCALE_BYTES, shWords, type ShPrecision } from './sh.js';
+import { sortByKey } from './radix-sort.js';
+import { noiseIn, packSh, PART, precisionFor, shWords, type ShPrecision } from './sh.js';
+import { unpackSplat } from './unpack.js';
 
 const { CULL_GROUP } = constants;
 
-/** Splats of a share at most, a power of two. */
+/** Splats of a share at most. */
 export const SHARE_SPLATS = 1 << 14;
-/** Where neighbours lie in a share need not be known exactly. */
-const SHARE_SAMPLES = 256;
+/** Cells are told apart by the highest bits of codes along the curve. */
+const CELL_BITS = 9;
+const CELLS = 1 << CELL_BITS;
+/** Splats of so many highest bits in common are a part of the scene, or belong to one. */
+const PART_BITS = 18;
+/** Words of a splat beside its geometry and its harmonics: its reach, its noise (see `choosePrecision`), its code along the curve. */
+const FACT_WORDS = 3;
 
-/**
- * Some splats of a scene, packed: all but what takes the whole scene to know. Neighbours in space are neighbours here, too, so that the whole is put together with
- * few jumps through memory. Its buffers are transferable.
- */
+/** What all shares of a scene have in common. */
+export interface ShareLayout {
+  readonly shDegree: ShDegree;
+  readonly shPrecision: ShPrecision;
+  /** Added to the positions of the cloud: see `recentred`. */
+  readonly moved: Vector3;
+  /** Undefined for a scene that keeps the order of its file. */
+  readonly curve: Curve | undefined;
+}
+
+/** Splats, each with all of its words in one run. Its buffers are transferable. */
 export interface PackedShare {
   readonly count: number;
-  /** Where each of them stood in the order that they came in. */
-  readonly rows: Uint16Array<ArrayBuffer>;
-  readonly shPrecision: ShPrecision;
+  readonly words: Uint32Array<ArrayBuffer>;
+  /** [CELLS] the end of each cell's splats, which follow one another. Empty for a scene that keeps its order. */
+  readonly ends: Uint32Array<ArrayBuffer>;
+}
+
+/** The splats of a cell, in the order of the file. Its buffers are transferable. */
+export interface ShareBlock {
+  readonly layout: ShareLayout;
+  /** Splats before it in the scene. */
+  readonly start: number;
+  readonly count: number;
+  readonly words: Uint32Array<ArrayBuffer>;
+}
+
+/** A block in its final order. Its buffers are transferable. */
+export interface SortedBlock {
+  readonly start: number;
   readonly geometry: Uint32Array<ArrayBuffer>;
   readonly sh: Uint32Array<ArrayBuffer>;
-  readonly opacities: Float32Array<ArrayBuffer>;
-  /** How far each splat reaches from its centre: see `boundChunks`. */
-  readonly reaches: Float32Array<ArrayBuffer>;
+  /** Bounds of chunks: the first and the last hold splats of other blocks, too. */
+  readonly chunks: Float32Array<ArrayBuffer>;
 }
 
-/** What the shares of a scene have in common. */
-export interface ShareFacts {
-  readonly shDegree: ShDegree;
-  readonly antialiased: boolean;
-  readonly filterVariance?: number | undefined;
-  readonly origin: Vector3;
-  readonly droppedCount: number;
+/** Facts of a scene that its splats do not hold. */
+export type ShareFacts = Pick<PackedGaussians, 'antialiased' | 'filterVariance' | 'origin' | 'droppedCount'>;
+
+/** The layout of a scene by some of its splats. */
+export function layoutOf(cloud: GaussianCloud, shPrecision: ShPrecision): ShareLayout {
+  const near = recentred(cloud);
+  const moved = near.origin.map((x, axis) => x - cloud.origin[axis]) as unknown as Vector3;
+  return { shDegree: cloud.shDegree, shPrecision, moved, curve: curveThrough(near.positions, usableIndices(near)) };
 }
 
-/** Scenes that several threads have packed, with what is needed to know their bounds. */
-export interface JoinedShares {
-  readonly packed: PackedGaussians;
-  /** As they came. */
-  readonly positions: Float32Array;
-  readonly opacities: Float32Array;
-}
+const wordsOf = ({ shDegree, shPrecision }: ShareLayout): number =>
+  GEOMETRY_WORDS + shWords(shDegree, shPrecision) + FACT_WORDS;
 
-/** How shares are put together. */
-export interface JoinOptions extends PackOptions {
-  /** Called once the shares have the precision that the scene needs: the file is of no more use. */
-  readonly onSettled?: () => void;
-  /** Frees arrays of shares that have been copied. */
-  readonly release?: (...arrays: ArrayBufferView[]) => void;
-}
-
-/** Packs at most {@link SHARE_SPLATS} splats, all of which can be drawn. */
-export function packShare(cloud: GaussianCloud, shPrecision: ShPrecision): PackedShare {
-  const { count } = cloud;
-  const order = mortonOrder(cloud.positions, identity(count), SHARE_SAMPLES);
-  const reaches = new Float32Array(count);
-  const opacities = new Float32Array(count);
-  for (let k = 0; k < count; k++) {
-    reaches[k] = reachOf(cloud, order[k]);
-    opacities[k] = cloud.opacities[order[k]];
+/** Packs at most {@link SHARE_SPLATS} splats. Those that cannot be drawn are left out. */
+export function packShare(given: GaussianCloud, layout: ShareLayout): PackedShare {
+  const { moved, curve, shPrecision, shDegree } = layout;
+  const isMoved = moved.some((x) => x !== 0);
+  const cloud = isMoved ? { ...given, positions: given.positions.map((x, i) => x - moved[i % 3]) } : given;
+  const usable = usableIndices(cloud);
+  const kept = isMoved ? withinReach(cloud.positions, usable) : usable;
+  const codes = curve && codesAlong(curve, cloud.positions, kept);
+  const order = codes ? sortByKey(kept, cellsOf(codes)) : kept;
+  const codeOf = codes && sortByKey(codes, cellsOf(codes));
+  const [stride, shStride] = [wordsOf(layout), shWords(shDegree, shPrecision)];
+  const words = new Uint32Array(stride * kept.length);
+  const floats = new Float32Array(words.buffer);
+  const geometry = packGeometry(cloud, order);
+  const sh = packSh(cloud, order, shPrecision);
+  const noiseOf = noiseIn(cloud);
+  for (let k = 0, at = 0; k < order.length; k++) {
+    for (let w = 0; w < GEOMETRY_WORDS; w++) words[at++] = geometry[GEOMETRY_WORDS * k + w];
+    for (let w = 0; w < shStride; w++) words[at++] = sh[shStride * k + w];
+    floats[at++] = reachOf(cloud, order[k]);
+    floats[at++] = noiseOf(order[k]);
+    words[at++] = codeOf?.[k] ?? 0;
   }
-  return {
-    ...{ count, shPrecision, opacities, reaches },
-    rows: Uint16Array.from(order),
-    geometry: packGeometry(cloud, order) as Uint32Array<ArrayBuffer>,
-    sh: packSh(cloud, order, shPrecision) as Uint32Array<ArrayBuffer>,
-  };
+  return { count: order.length, words, ends: endsOf(codeOf) };
 }
 
-/**
- * Puts shares together: to the byte what `packGaussians` makes of the whole scene.
- * @param shares in the order of the scene
- * @returns the precision that the scene needs, where shares have another: they must be packed again
- */
-export function joinShares(
-  shares: readonly PackedShare[],
-  { sh: asked = 'auto', onSettled, release }: JoinOptions,
-  facts: ShareFacts,
-): JoinedShares | ShPrecision {
-  const count = shares.reduce((sum, share) => sum + share.count, 0);
-  const { positions, opacities, places } = columnsOf(shares, count);
-  const cloud = recentred({ ...facts, count, positions, opacities } as GaussianCloud);
-  const usable = usableOf(cloud.positions, count);
-  const kept = mortonOrder(cloud.positions, usable);
-  const shPrecision = asked === 'auto' ? precisionFor(shares, facts.shDegree, kept, places) : asked;
-  if (shares.some((share) => share.shPrecision !== shPrecision)) return shPrecision;
-  onSettled?.();
-  const packed = {
-    ...{
-      count: kept.length,
-      shDegree: facts.shDegree,
-      shPrecision,
-      antialiased: facts.antialiased,
-      filterVariance: facts.filterVariance,
-      origin: cloud.origin,
-    },
-    droppedCount: facts.droppedCount + count - kept.length,
-    ...gather(
-      shares,
-      kept,
-      places,
-      cloud.positions === positions ? undefined : cloud.positions,
-      shWords(facts.shDegree, shPrecision),
-      release,
-    ),
-  };
-  return { packed, positions, opacities };
+const cellOf = (code: number): number => code >>> (32 - CELL_BITS);
+const cellsOf = (codes: Uint32Array): Uint32Array => codes.map(cellOf);
+
+/** @param codes whose cells ascend */
+function endsOf(codes: Uint32Array | undefined): Uint32Array<ArrayBuffer> {
+  const ends = new Uint32Array(codes ? CELLS : 0);
+  if (codes === undefined) return ends;
+  for (const code of codes) ends[cellOf(code)]++;
+  for (let cell = 1; cell < CELLS; cell++) ends[cell] += ends[cell - 1];
+  return ends;
 }
 
-const SHIFT = Math.log2(SHARE_SPLATS);
-const MASK = SHARE_SPLATS - 1;
+/** Moved to another origin, a splat may be too far away. */
+function withinReach(positions: Float32Array, kept: Uint32Array): Uint32Array {
+  const isNear = (x: number): boolean => Math.abs(x) <= MAX_POSITION;
+  return kept.filter((i) => isNear(positions[3 * i]) && isNear(positions[3 * i + 1]) && isNear(positions[3 * i + 2]));
+}
 
-const identity = (count: number): Uint32Array => {
+/** A cell that has its splats in pieces: the block is made when it is needed, since shares are added while a download goes on. */
+export interface ShareCell {
+  readonly start: number;
+  readonly count: number;
+  /** Copies the splats together, into the memory that is given if it suffices. */
+  readonly block: (room?: ArrayBuffer) => ShareBlock;
+}
+
+/** The splats of a scene by cells. */
+export class ShareCells {
+  readonly #layout: ShareLayout;
+  readonly #shares: PackedShare[] = [];
+  /** Splats of all shares. */
+  #count = 0;
+  /** Sums of noise, and how many splats, by parts. */
+  readonly #noises = new Float64Array(1 << PART_BITS);
+  readonly #counts = new Uint32Array(1 << PART_BITS);
+
+  constructor(layout: ShareLayout) {
+    this.#layout = layout;
+  }
+
+  /** Takes the next share, in the order of the file: splats of one code keep that order. */
+  add(share: PackedShare): void {
+    this.#shares.push(share);
+    const stride = wordsOf(this.#layout);
+    const floats = new Float32Array(share.words.buffer);
+    for (let at = stride - 1; at < share.words.length; at += stride) {
+      const part = this.#layout.curve ? share.words[at] >>> (32 - PART_BITS) : (this.#count / PART) % (1 << PART_BITS);
+      this.#noises[part | 0] += floats[at - 1];
+      this.#counts[part | 0]++;
+      this.#count++;
+    }
+  }
+
+  /**
+   * The layout that the scene needs, once all of its shares are known: their own, or another, by which they must be packed again.
+   * @param asked precision of spherical harmonics
+   */
+  layoutFor(asked: PackOptions['sh'] = 'auto'): ShareLayout {
+    const layout = this.#layout;
+    const shPrecision = asked === 'auto' ? this.#precision() : asked;
+    if (shPrecision !== layout.shPrecision) return { ...layout, shPrecision };
+    return layout.curve && isOfPlanes(this.#somePositions()) ? { ...layout, curve: undefined } : layout;
+  }
+
+  /** As `choosePrecision` does, by parts of {@link PART} splats or a few more. */
+  #precision(): ShPrecision {
+    let [sum, worst, noise, count] = [0, 0, 0, 0];
+    this.#noises.forEach((more, part) => {
+      sum += more;
+      noise += more;
+      count += this.#counts[part];
+      if (count < PART) return;
+      worst = Math.max(worst, noise / count);
+      noise = count = 0;
+    });
+    return precisionFor(sum / Math.max(1, this.#count), Math.max(worst, count > PART / 2 ? noise / count : 0));
+  }
+
+  #somePositions(): Float32Array {
+    const stride = wordsOf(this.#layout);
+    const step = Math.max(1, Math.floor(this.#count / SAMPLE));
+    const positions: number[] = [];
+    for (const { words, count } of this.#shares) {
+      const floats = new Float32Array(words.buffer);
+      for (let i = 0; i < count; i += step) positions.push(...floats.subarray(stride * i, stride * i + 3));
+    }
+    return Float32Array.from(positions);
+  }
+
+  /** Cells that hold something, in the order of the scene. */
+  all(): ShareCell[] {
+    const cells: ShareCell[] = [];
+    let start = 0;
+    for (let cell = 0; cell < (this.#layout.curve ? CELLS : this.#shares.length); cell++) {
+      const ranges = this.#rangesOf(cell);
+      const count = ranges.reduce((sum, { first, end }) => sum + end - first, 0);
+      if (count > 0) cells.push(this.#cell(start, count, ranges));
+      start += count;
+    }
+    return cells;
+  }
+
+  #rangesOf(cell: number): Range[] {
+    if (this.#layout.curve === undefined)
+      return [{ share: this.#shares[cell], first: 0, end: this.#shares[cell].count }];
+    return this.#shares.map((share) => ({ share, first: share.ends[cell - 1] ?? 0, end: share.ends[cell] }));
+  }
+
+  #cell(start: number, count: number, ranges: readonly Range[]): ShareCell {
+    const layout = this.#layout;
+    const stride = wordsOf(layout);
+    const block = (room = new ArrayBuffer(0)): ShareBlock => {
+      const bytes = 4 * stride * count;
+      const words = new Uint32Array(room.byteLength < bytes ? new ArrayBuffer(bytes) : room, 0, stride * count);
+      let at = 0;
+      // A view for each of some 100,000 ranges would cost more than this loop.
+      for (const { share, first, end } of ranges)
+        for (let from = stride * first; from < stride * end;) words[at++] = share.words[from++];
+      return { layout, start, count, words };
+    };
+    return { start, count, block };
+  }
+}
+
+/** Splats of a share. */
+interface Range {
+  readonly share: PackedShare;
+  readonly first: number;
+  readonly end: number;
+}
+
+/** Puts the splats of a block in the order of their codes, and bounds its chunks. */
+export function sortBlock({ layout, start, count, words }: ShareBlock): SortedBlock {
+  const [stride, shStride] = [wordsOf(layout), shWords(layout.shDegree, layout.shPrecision)];
+  const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
+  const geometry = new Uint32Array(GEOMETRY_WORDS * count);
+  const sh = new Uint32Array(shStride * count);
+  const firstChunk = Math.floor(start / CULL_GROUP);
+  const chunks = emptyChunks(Math.ceil((start + count) / CULL_GROUP) - firstChunk);
+  const order = layout.curve ? orderOf(words, stride, count) : undefined;
+  for (let k = 0; k < count; k++) {
+    const from = stride * (order ? order[k] : k);
+    for (let w = 0; w < GEOMETRY_WORDS; w++) geometry[GEOMETRY_WORDS * k + w] = words[from + w];
+    for (let w = 0; w < shStride; w++) sh[shStride * k + w] = words[from + GEOMETRY_WORDS + w];
+    grow(
+      chunks,
+      CHUNK_NUMBERS * (Math.floor((start + k) / CULL_GROUP) - firstChunk),
+      floats,
+      from,
+      floats[from + stride - 3],
+    );
+  }
+  return { start, geometry, sh, chunks };
+}
+
+/** Numbers of splats in the order of their codes, which are their last words. */
+function orderOf(words: Uint32Array, stride: number, count: number): Uint32Array {
+  const codes = new Uint32Array(count);
+  for (let k = 0; k < count; k++) codes[k] = words[stride * (k + 1) - 1];
+  return sortByKey(upTo(count), codes);
+}
+
+const upTo = (count: number): Uint32Array => {
   const all = new Uint32Array(count);
   for (let i = 0; i < count; i++) all[i] = i;
   return all;
 };
 
-/** As the scales of their `int8` codes say; shares have `float16` only once that has been found too coarse. */
-function precisionFor(
-  shares: readonly PackedShare[],
-  shDegree: ShDegree,
-  kept: Uint32Array,
-  places: Uint32Array,
-): ShPrecision {
-  if (shares.some(({ shPrecision }) => shPrecision !== 'int8')) return 'float16';
-  const codes = shares.map(({ sh }) => new Uint8Array(sh.buffer));
-  const stride = 4 * shWords(shDegree, 'int8');
-  return choosePrecision((i) => {
-    const at = stride * (places[i] & MASK);
-    let noise = 0;
-    for (let band = 0; band < shDegree; band++)
-      noise += BAND_SIZES[band] * CODE_NOISE[codes[places[i] >>> SHIFT][at + SCALE_BYTES[band]]];
-    return noise;
-  }, kept);
-}
-
-/** Of all shares, and where each splat lies: its share, and its number there. */
-function columnsOf(
-  shares: readonly PackedShare[],
-  count: number,
-): { positions: Float32Array; opacities: Float32Array; places: Uint32Array } {
-  const positions = new Float32Array(3 * count);
-  const opacities = new Float32Array(count);
-  const places = new Uint32Array(count);
-  let first = 0;
-  shares.forEach((share, number) => {
-    const floats = new Float32Array(share.geometry.buffer);
-    for (let i = 0; i < share.count; i++) {
-      const splat = first + share.rows[i];
-      positions[3 * splat] = floats[GEOMETRY_WORDS * i];
-      positions[3 * splat + 1] = floats[GEOMETRY_WORDS * i + 1];
-      positions[3 * splat + 2] = floats[GEOMETRY_WORDS * i + 2];
-      opacities[splat] = share.opacities[i];
-      places[splat] = (number << SHIFT) | i;
-    }
-    first += share.count;
-  });
-  return { positions, opacities, places };
-}
-
-/** Moved to another origin, a splat may be too far away. */
-function usableOf(positions: Float32Array, count: number): Uint32Array {
-  const usable = new Uint32Array(count);
-  let kept = 0;
-  for (let i = 0; i < count; i++) {
-    const at = 3 * i;
-    const farthest = Math.max(Math.abs(positions[at]), Math.abs(positions[at + 1]), Math.abs(positions[at + 2]));
-    if (farthest <= MAX_POSITION) usable[kept++] = i;
-  }
-  return usable.subarray(0, kept);
-}
-
-/** The words of the splats in their order, and the bounds of each chunk of them. Its time is waiting for memory, and processors wait for reads only: shares are read from their first splat to their last. */
-function gather(
-  shares: readonly PackedShare[],
-  kept: Uint32Array,
-  places: Uint32Array,
-  moved: Float32Array | undefined,
-  shStride: number,
-  release: JoinOptions['release'],
-): Pick<PackedGaussians, 'geometry' | 'sh' | 'chunks'> {
-  const geometry = new Uint32Array(GEOMETRY_WORDS * kept.length);
-  const sh = new Uint32Array(shStride * kept.length);
-  const reaches = new Float32Array(kept.length);
-  const targets = new Uint32Array(shares.length << SHIFT).fill(LEFT_OUT);
-  for (let k = 0; k < kept.length; k++) targets[places[kept[k]]] = k;
-  shares.forEach((share, number) => {
-    const own = targets.subarray(number << SHIFT, (number + 1) << SHIFT);
-    spread(share.geometry, own, geometry, GEOMETRY_WORDS, share.count);
-    spread(share.sh, own, sh, shStride, share.count);
-    for (let i = 0; i < share.count; i++) if (own[i] !== LEFT_OUT) reaches[own[i]] = share.reaches[i];
-    release?.(share.geometry, share.sh);
-  });
-  const floats = new Float32Array(geometry.buffer);
-  if (moved)
-    for (let k = 0; k < kept.length; k++)
-      for (let axis = 0; axis < 3; axis++) floats[GEOMETRY_WORDS * k + axis] = moved[3 * kept[k] + axis];
-  const chunks = new Float32Array(CHUNK_NUMBERS * Math.ceil(kept.length / CULL_GROUP));
-  for (let k = 0; k < kept.length; k++)
-    grow(
-      chunks,
-      CHUNK_NUMBERS * Math.floor(k / CULL_GROUP),
-      floats,
-      GEOMETRY_WORDS * k,
-      reaches[k],
-      k % CULL_GROUP === 0,
-    );
-  return { geometry, sh, chunks };
-}
-
-/** In place of the number of a splat that is not kept. */
-const LEFT_OUT = 0xffffffff;
-
-/** Copies rows of words, row i to row `targets[i]`. */
-function spread(from: Uint32Array, targets: Uint32Array, to: Uint32Array, stride: number, count: number): void {
-  for (let i = 0; i < count; i++) {
-    if (targets[i] === LEFT_OUT) continue;
-    const [start, at] = [stride * i, stride * targets[i]];
-    for (let k = 0; k < stride; k++) to[at + k] = from[start + k];
-  }
+function emptyChunks(count: number): Float32Array<ArrayBuffer> {
+  const chunks = new Float32Array(CHUNK_NUMBERS * count);
+  for (let at = 0; at < chunks.length; at += CHUNK_NUMBERS)
+    for (let axis = 0; axis < 3; axis++) [chunks[at + axis], chunks[at + 4 + axis]] = [Infinity, -Infinity];
+  return chunks;
 }
 
 /** Takes another splat into a chunk: see `boundChunks`. */
-function grow(
-  chunks: Float32Array,
-  at: number,
-  floats: Float32Array,
-  from: number,
-  reach: number,
-  isFirst: boolean,
-): void {
+function grow(chunks: Float32Array, at: number, floats: Float32Array, from: number, reach: number): void {
   for (let axis = 0; axis < 3; axis++) {
     const x = floats[from + axis];
-    if (isFirst || x < chunks[at + axis]) chunks[at + axis] = x;
-    if (isFirst || x > chunks[at + 4 + axis]) chunks[at + 4 + axis] = x;
+    if (x < chunks[at + axis]) chunks[at + axis] = x;
+    if (x > chunks[at + 4 + axis]) chunks[at + 4 + axis] = x;
   }
   if (reach > chunks[at + 3]) chunks[at + 3] = reach;
+}
+
+/** A scene of which blocks come in any order. */
+export class JoinedBlocks {
+  readonly #layout: ShareLayout;
+  readonly #geometry: Uint32Array;
+  readonly #sh: Uint32Array;
+  readonly #chunks: Float32Array;
+  readonly #count: number;
+
+  /** @param count splats of all blocks */
+  constructor(layout: ShareLayout, count: number) {
+    this.#layout = layout;
+    this.#geometry = new Uint32Array(GEOMETRY_WORDS * count);
+    this.#sh = new Uint32Array(shWords(layout.shDegree, layout.shPrecision) * count);
+    this.#chunks = emptyChunks(Math.ceil(count / CULL_GROUP));
+    this.#count = count;
+  }
+
+  add({ start, geometry, sh, chunks }: SortedBlock): void {
+    this.#geometry.set(geometry, GEOMETRY_WORDS * start);
+    this.#sh.set(sh, shWords(this.#layout.shDegree, this.#layout.shPrecision) * start);
+    const first = CHUNK_NUMBERS * Math.floor(start / CULL_GROUP);
+    for (let at = 0; at < chunks.length; at += CHUNK_NUMBERS) {
+      grow(this.#chunks, first + at, chunks, at, chunks[at + 3]);
+      grow(this.#chunks, first + at, chunks, at + 4, 0);
+    }
+  }
+
+  /** The scene, to the byte what `packGaussians` makes of it if the layout is that of the whole scene. */
+  finish(facts: ShareFacts): PackedGaussians {
+    const { shDegree, shPrecision, moved } = this.#layout;
+    return {
+      ...{ count: this.#count, shDegree, shPrecision },
+      ...facts,
+      origin: facts.origin.map((x, axis) => x + moved[axis]) as unknown as Vector3,
+      ...{ geometry: this.#geometry, sh: this.#sh, chunks: this.#chunks },
+    };
+  }
+}
+
+/** Splats whose places tell those of all. */
+const SAMPLE = 65_536;
+
+/** Positions and opacities of evenly spaced splats. */
+function sampleOf({
+  count,
+  geometry,
+}: Pick<PackedGaussians, 'count' | 'geometry'>): Pick<GaussianCloud, 'count' | 'positions' | 'opacities'> {
+  const step = Math.max(1, Math.floor(count / SAMPLE));
+  const taken = Math.ceil(count / step);
+  const positions = new Float32Array(3 * taken);
+  const factors = new Float32Array(6 * taken);
+  const opacities = new Float32Array(taken);
+  const words = new Uint32Array(GEOMETRY_WORDS * taken);
+  for (let k = 0; k < taken; k++) {
+    const from = GEOMETRY_WORDS * step * k;
+    words.set(geometry.subarray(from, from + GEOMETRY_WORDS), GEOMETRY_WORDS * k);
+    unpackSplat(words, k, positions, factors, opacities);
+  }
+  return { count: taken, positions, opacities };
+}
+
+/** Bounds of a scene: its box to the bit, the rest from a sample of its splats. */
+export function boundsOfPacked(packed: PackedGaussians): Bounds {
+  const bounds = boundsOf({ ...sampleOf(packed), origin: packed.origin });
+  const edge = (first: number, farther: (a: number, b: number) => number): Vector3 => {
+    const corner = [first, first, first];
+    for (let at = 0; at < packed.chunks.length; at += CHUNK_NUMBERS)
+      for (let axis = 0; axis < 3; axis++)
+        corner[axis] = farther(corner[axis], packed.chunks[at + axis + (first > 0 ? 0 : 4)]);
+    return corner.map((x, axis) => x + packed.origin[axis]) as unknown as Vector3;
+  };
+  return { ...bounds, min: edge(Infinity, Math.min), max: edge(-Infinity, Math.max) };
 }
