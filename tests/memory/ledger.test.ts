@@ -84,7 +84,7 @@ test('what is soon not needed any more is given back before anybody is refused, 
       ledger.spare.delete(giveBack);
       reservation.release();
     };
-    ledger.spare.add(giveBack);
+    ledger.spare.set(giveBack, 0);
   }
   ledger.reserve('beside', 20);
   assert.deepEqual(given, []);

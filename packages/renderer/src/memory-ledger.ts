@@ -23,8 +23,13 @@ export interface Reservation {
 export class MemoryLedger {
   /** Most bytes that all scenes of the device together may hold. */
   budgetBytes = Infinity;
-  /** Called one after the other where there is no room, before a request is refused: each may give back what will soon not be needed any more. */
-  readonly spare = new Set<() => void>();
+  /** Bytes that scenes out of sight may hold while others are loaded. */
+  unseenBytes = Infinity;
+  /**
+   * Functions that give back what will soon not be needed any more, called one after the other if there is no room for a request; with the bytes of those
+   * that are out of sight, which are called if these hold more than {@link unseenBytes}, too.
+   */
+  readonly spare = new Map<() => void, number>();
   readonly #held = new Set<Reservation>();
 
   /** The ledger of a device, or of a context of WebGL; all scenes on it share one. */
@@ -47,6 +52,10 @@ export class MemoryLedger {
     return sum;
   }
 
+  get #unseen(): number {
+    return [...this.spare.values()].reduce((sum, bytes) => sum + bytes, 0);
+  }
+
   /**
    * Sets bytes aside before they are allocated: a device that runs out of memory may be lost, and the page with it.
    * @param most bytes that this reservation may take, besides what is left; default no limit
@@ -61,9 +70,9 @@ export class MemoryLedger {
         remedy: 'hand over the bytes that will be allocated',
       });
     if (bytes > most) throw overBudget(label, bytes, `${inBytes(most)}, the memoryBudget that was given`);
-    for (const giveBack of this.spare) {
-      if (bytes <= this.budgetBytes - this.bytes) break;
-      giveBack();
+    for (const [giveBack, unseen] of this.spare) {
+      const isScarce = bytes > this.budgetBytes - this.bytes;
+      if (isScarce || (unseen && this.#unseen > this.unseenBytes)) giveBack();
     }
     const left = this.budgetBytes - this.bytes;
     if (bytes > left)

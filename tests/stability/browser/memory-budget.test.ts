@@ -136,3 +136,39 @@ describe('S12: all scenes of a page together', () => {
     }
   });
 });
+
+describe('S12: scenes out of sight', () => {
+  beforeEach(() => until(() => ledger().bytes === 0, 'an empty ledger'));
+  afterEach(() => {
+    document.querySelectorAll('.far').forEach((element) => element.remove());
+    scrollTo(0, 0);
+  });
+
+  it('are dropped for others, and come back in sight without an event', async () => {
+    const first = await showLoaded();
+    const one = ledger().bytes;
+    // A quarter of what the page may hold is less than one scene.
+    await onMachineOf(machineFor(3.5 * one), async () => {
+      const far = document.createElement('div');
+      far.className = 'far';
+      far.style.height = '4000px';
+      document.body.append(far);
+      const second = show({ src: `${COMPASS}?second` });
+      far.after(second);
+      second.scrollIntoView();
+      await second.ready;
+      assert(second.loaded, String(second.error?.message));
+      assertEqual(ledger().bytes, one, 'bytes while the second is in sight');
+      assert(first.loaded, 'for the page the first is there');
+      const events: string[] = [];
+      for (const type of ['loadstart', 'load-start', 'progress', 'load', 'error', 'contextlost'])
+        first.addEventListener(type, () => events.push(type));
+      scrollTo(0, 0);
+      await until(() => first.stats?.renderer !== undefined && first.stats.bytes.scene > 0, 'the first is back');
+      const blob = await first.toBlob();
+      assert(blob.size > 1000, `an image of ${blob.size} bytes`);
+      assertEqual(events, [], 'events');
+      assertEqual(ledger().bytes, one, 'bytes while the first is in sight');
+    });
+  });
+});

@@ -82,6 +82,10 @@ export class SceneController implements ReactiveController {
   readonly #running = new LatestTask();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
   #waiters: (() => void)[] = [];
+  /** Undefined until it has been in sight. */
+  #isUnseen: boolean | undefined;
+  /** It was dropped out of sight, and is to come back. */
+  #isAway = false;
   /** A loss was told that no recovery has answered yet; another scene may do so. */
   #isContextLost = false;
   /** Grows with every loss of the device: a frame that ran too long for the driver may have been the cause. */
@@ -146,6 +150,7 @@ export class SceneController implements ReactiveController {
     if (this.isOther(request)) {
       const isSwap = this.#request !== null;
       this.#running.renew();
+      this.#isAway = false;
       this.#submissions = 1;
       this.#request = request;
       this.#error = null;
@@ -157,6 +162,15 @@ export class SceneController implements ReactiveController {
       void this.#refine();
     }
     if (this.#state === 'waiting' && mayStart) void this.#load(request);
+  }
+
+  /** Whether the scene is in sight. One that has been, and is not any more, may be dropped; it comes back, unnoticed, in sight. */
+  see(isSeen: boolean): void {
+    if (!isSeen && this.#isUnseen === undefined) return;
+    this.#isUnseen = !isSeen;
+    if (isSeen && this.#isAway) void this.#attempt(this.#request!, this.#running.renew(), false, () => undefined);
+    if (isSeen) this.#isAway = false;
+    this.#spare(false);
   }
 
   /**
@@ -337,6 +351,7 @@ export class SceneController implements ReactiveController {
   #replace(scene: LoadedGaussians, isPreview: boolean): void {
     this.#drop(false);
     this.#scene = scene;
+    this.#isAway = false;
     this.#shownRequest = this.#request;
     this.#isPreview = isPreview;
     this.#spare(isPreview);
@@ -345,6 +360,7 @@ export class SceneController implements ReactiveController {
   #clear(): void {
     this.#running.renew();
     this.#request = null;
+    this.#isAway = false;
     this.#drop(true);
     this.#error = null;
     this.#setState('empty');
@@ -355,11 +371,18 @@ export class SceneController implements ReactiveController {
   #spare(isSpare: boolean): void {
     if (this.#scene === null) return;
     const { spare } = this.#scene.place.memory;
-    if (isSpare || this.#releaseTimer) spare.add(this.#giveBack);
+    // What a generator has come to is not to be had again.
+    const isUnseen = this.#isUnseen && this.#state === 'ready' && !this.#scene.live;
+    if (isSpare || this.#releaseTimer || isUnseen)
+      spare.set(this.#giveBack, isUnseen ? this.#scene.gaussians.byteLength : 0);
     else spare.delete(this.#giveBack);
   }
 
-  readonly #giveBack = (): void => (this.#releaseTimer ? this.#clear() : this.#drop(false));
+  readonly #giveBack = (): void => {
+    if (this.#releaseTimer) return this.#clear();
+    this.#isAway = this.#isUnseen === true && this.#state === 'ready';
+    this.#drop(false);
+  };
 
   #drop(clear: boolean): void {
     if (this.#scene !== null || clear) this.#of.hide(clear);

@@ -7,7 +7,7 @@ import type { SceneController } from './scene-controller.js';
 export interface SourceHost {
   readonly attributes: Attributes;
   readonly services: Services;
-  readonly scene: Pick<SceneController, 'want' | 'isOther'>;
+  readonly scene: Pick<SceneController, 'want' | 'see' | 'isOther'>;
   /** Somebody would see the scene. */
   readonly isInSight: boolean;
   /** Whether an element is in the page: those that are not ask for nothing. */
@@ -45,8 +45,9 @@ export class SourceController {
   /** Asks for the scene of now, and for its bytes if it is time. */
   request(): void {
     const { attributes, isInSight, isConnected, scene } = this.#host;
-    const mayStart = attributes.loading === 'eager' || this.#isWanted || isInSight;
-    if (isConnected) scene.want(this.#requestOf(this.#source), mayStart);
+    const isSeen = this.#isWanted || isInSight;
+    if (isConnected) scene.want(this.#requestOf(this.#source), attributes.loading === 'eager' || isSeen);
+    scene.see(isSeen);
   }
 
   /** Whether a source asks for another scene than the one that is shown or loaded. */

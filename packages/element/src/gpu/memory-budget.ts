@@ -25,6 +25,12 @@ const set = new WeakMap<GPUDevice, number>();
 export function limitScenes(device: GPUDevice, memoryBudget = 0): void {
   const ledger = MemoryLedger.of(device);
   if (ledger.budgetBytes !== (set.get(device) ?? Infinity)) return;
-  ledger.budgetBytes = Math.max(memoryBudget, defaultMemoryBudget() ?? Infinity);
+  limit(ledger, memoryBudget);
   set.set(device, ledger.budgetBytes);
+}
+
+/** Limits the scenes of a ledger. Out of sight a desktop keeps some, which are at once there when visitors scroll back; a phone keeps none. */
+export function limit(ledger: MemoryLedger, memoryBudget = 0): void {
+  ledger.budgetBytes = Math.max(memoryBudget, defaultMemoryBudget() ?? Infinity);
+  ledger.unseenBytes = isHandheld() ? 0 : ledger.budgetBytes / 4;
 }

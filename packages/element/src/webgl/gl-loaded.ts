@@ -1,6 +1,6 @@
 import { glBytes, GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
 import { LoadedGaussians, type OwnedGaussians } from '../gpu/loaded-gaussians.js';
-import { defaultMemoryBudget } from '../gpu/memory-budget.js';
+import { limit } from '../gpu/memory-budget.js';
 import type { Contents, Painter, PainterEvents } from '../gpu/painter.js';
 import type { LoadedScene } from '../loading/protocol.js';
 import { GlPainter } from './gl-painter.js';
@@ -42,7 +42,7 @@ export class GlLoaded extends LoadedGaussians {
     const { packed } = scene;
     const byteLength = glBytes(packed);
     const ledger = lease.memory;
-    ledger.budgetBytes = Math.max(memoryBudget ?? 0, defaultMemoryBudget() ?? Infinity);
+    limit(ledger, memoryBudget);
     const reservation = ledger.reserve(`scene of ${packed.count} splats`, byteLength, memoryBudget);
     let textures: GlGaussians | undefined;
     let frames: GlRenderer | undefined;
