@@ -3,8 +3,7 @@ import { spawnSync } from 'node:child_process';
 import { existsSync, readFileSync, statSync } from 'node:fs';
 import { basename, join } from 'node:path';
 import { readScene } from '@gaussian-splat/formats';
-import { cloudOfChunks } from '@gaussian-splat/economise/pages';
-import { decodePage } from '@gaussian-splat/renderer/tools';
+import { cloudOfChunks, decodePage } from '@gaussian-splat/renderer/tools';
 import { root } from '../lib/run.mjs';
 
 /** The tool of others that writes their formats, by npx. */

@@ -10,11 +10,10 @@ import {
   type ShDegree,
 } from '@gaussian-splat/core';
 import { checkManifest, GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
-import { decodePage } from '@gaussian-splat/renderer/tools';
+import { cloudOfChunks, decodePage } from '@gaussian-splat/renderer/tools';
 import { constants, pageLayout } from '@gaussian-splat/renderer/stages';
 import {
   buildDetailTree,
-  cloudOfChunks,
   codingOf,
   cutPages,
   manifestOf,

@@ -23,6 +23,8 @@ export interface ReadSceneOptions extends LoadLimits {
   readonly openPart?: OpenPart;
   /** Level of detail that is read of a streamed scene, 0 (default) the finest; `all` reads all of them, for renderers that choose: see `GaussianCloud.levelRuns`. */
   readonly level?: number | 'all';
+  /** Of streamed SOG the finest level with at most so many splats is read, and the coarsest if none has so few. */
+  readonly mostSplats?: number;
   /**
    * Called, if the scene is large and its format allows, with some of its splats, spread over all of it and larger to stand
    * for the rest, before the whole is read. Reading goes on once the promise fulfils.
@@ -41,7 +43,7 @@ export interface ReadSceneOptions extends LoadLimits {
  * `argument/value` for what are no bytes, `out-of-memory/budget` for what asks for more than its bytes or the limits in `options` allow, or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
  */
 export async function readScene(file: FileBytes, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
-  const { name = 'scene', contentType = '', signal, openPart, level, onPreview } = options;
+  const { name = 'scene', contentType = '', signal, openPart, level, mostSplats, onPreview } = options;
   signal?.throwIfAborted();
   const bytes = plainBytes(file, name);
   if (bytes.length === 0) throw emptyFile(name);
@@ -74,7 +76,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
       return part;
     });
   const source: SceneSource = {
-    ...{ bytes, name, budget, signal, openPart: openPlain, level },
+    ...{ bytes, name, budget, signal, openPart: openPlain, level, mostSplats },
     onPreview: onPreview && preview,
   };
   const whole = await (async () => read(source))().catch((error: unknown) => {

@@ -27,6 +27,8 @@ export interface SceneSource {
   readonly openPart?: OpenPart;
   /** Which level of a scene with levels of detail is read: 0 is the finest. `all`: all of them, in the runs that `GaussianCloud.levelRuns` tells. */
   readonly level?: number | 'all';
+  /** See `ReadSceneOptions.mostSplats`. */
+  readonly mostSplats?: number | undefined;
   /** Called with a part of the splats that stands for all, before the whole is read. See `ReadSceneOptions.onPreview`. */
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }

@@ -20,8 +20,11 @@ export { recentred } from './pack/recentre.js';
 export { choosePrecision, noiseIn, SCALE_BIAS, SCALE_STEPS, type ShPrecision } from './pack/sh.js';
 export { shReader } from './pack/unpack.js';
 export { decodePage } from './streaming/decode-page.js';
+export { finestPages } from './streaming/finest-pages.js';
 export { pageLayout, type DetailManifest } from './streaming/manifest.js';
+export { cloudOfChunks, type PageChunks } from './streaming/page-cloud.js';
 export * from './streaming/page-coding.js';
+export { listPages, type InstanceList } from './streaming/page-list.js';
 export {
   CENTER_ROUNDING,
   directionIn2,

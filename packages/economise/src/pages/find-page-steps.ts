@@ -1,12 +1,11 @@
 import { boundsOf, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { decodePage } from '@gaussian-splat/renderer/tools';
+import { cloudOfChunks, decodePage } from '@gaussian-splat/renderer/tools';
 import { GpuEvaluator } from '../gpu/gpu-evaluator.js';
 import { decibels, mean, meanSquareOf } from '../measure.js';
 import { findSteps, type Steps } from '../steps.js';
 import { viewsAround, viewsFromEverywhere } from '../views.js';
 import { manifestOf, type BuiltPage, type DetailTree } from './build-pages.js';
 import { codingOf, PageEncoder, USUAL_STEPS, type PageSteps } from './encode-page.js';
-import { cloudOfChunks } from './page-cloud.js';
 import type { Deflate } from './page-planes.js';
 import type { SeenSplats } from './seen-splats.js';
 

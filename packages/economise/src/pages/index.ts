@@ -18,7 +18,6 @@ export {
 } from './encode-page.js';
 export { findPageSteps, type FoundPageSteps, type PageStepsOptions } from './find-page-steps.js';
 export { placesOnGrid, writePages, type FolderCoding, type PageFolderOptions } from './page-folder.js';
-export { cloudOfChunks, type PageChunks } from './page-cloud.js';
 export type { Deflate } from './page-planes.js';
 export { HarmonicRounder } from './round-harmonics.js';
 export { weighSplats, type SeenSplats } from './seen-splats.js';

@@ -5,7 +5,7 @@ import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { Here, SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './painter.js';
-import { isHandheld } from './memory-budget.js';
+import { streamCaps } from './stream-caps.js';
 
 export interface StreamedOptions {
   readonly loader: SceneLoader;
@@ -17,14 +17,6 @@ export interface StreamedOptions {
   readonly onChange: () => void;
 }
 
-/** What a device is trusted with: phones end pages that take more. */
-interface Caps {
-  readonly splats: number;
-  readonly bytes: number;
-}
-
-const PHONE: Caps = { splats: 1e6, bytes: 160e6 };
-const DESKTOP: Caps = { splats: 3e6, bytes: 512e6 };
 /** Of the memory that all scenes of the page have left: another one may come. */
 const SHARE_OF_REST = 0.5;
 /** Parts of a scene that failed are listed up to so many. */
@@ -42,7 +34,7 @@ export async function openStreamed(
   options: StreamedOptions,
 ): Promise<{ gaussians: StreamedGaussians; detail: DetailLevers; warnings: readonly string[] }> {
   const { signal, memoryBudget = Infinity, onChange } = options;
-  const caps = isHandheld() ? PHONE : DESKTOP;
+  const caps = streamCaps();
   const warnings: string[] = [];
   const pool: PoolOptions = {
     // As coarse as it must be beside many others, but never without a place: asked for when that is taken.

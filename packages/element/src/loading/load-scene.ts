@@ -65,6 +65,11 @@ export async function loadScene(
       order: cloud.hints?.order,
       hasMeshes: cloud.hints?.meshes,
     });
+    if (request.streamBytes !== undefined) {
+      const { loadWholeStream } = await loadModule('the code that streams scenes', () => import('./whole-stream.js'));
+      const load = { name, limits, options, pack, onProgress, onPreview, onReading };
+      return await loadWholeStream(request, request.streamBytes, signal, load);
+    }
     const start = performance.now();
     const previews = new Lazy('the code of previews', async () => {
       const { PreviewSchedule } = await import('./preview-schedule.js');

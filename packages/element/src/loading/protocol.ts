@@ -49,6 +49,8 @@ export interface SceneRequest extends FileRequest {
   readonly renderer?: RendererChoice;
   /** Whether a streamed SOG scene is loaded whole, in its finest level. */
   readonly isWhole?: boolean;
+  /** Bytes of GPU memory that a streamed scene may take where it is not drawn page by page: as much of it is loaded as fits. */
+  readonly streamBytes?: number;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
   /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */

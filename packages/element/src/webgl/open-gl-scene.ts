@@ -2,6 +2,7 @@
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { isGenerator, isStreamed, type OpenOptions } from '../gpu/open-scene.js';
+import { streamCaps } from '../gpu/stream-caps.js';
 import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
 import { GlLoaded } from './gl-loaded.js';
 import { acquireGl, cannotShow, noWebGl, type GlLease } from './gl-session.js';
@@ -19,8 +20,10 @@ export async function openGlScene(
   options: OpenOptions,
   reason: unknown,
 ): Promise<LoadedGaussians> {
-  // Levels of detail are for WebGPU alone: the finest one is the scene.
-  const request = { ...asked, levels: false, isWhole: true };
+  // Levels of detail are for WebGPU alone: the finest one is the scene, and of a streamed one as much as fits.
+  const { memoryBudget = Infinity } = options;
+  const streamBytes = isStreamed(asked) ? Math.min(memoryBudget, streamCaps().bytes) : undefined;
+  const request = { ...asked, levels: false, streamBytes };
   const lease = acquireGl();
   if (lease === undefined) throw reason ?? noWebGl();
   const { signal, onProgress, beforeUpload, loader, live } = options;
@@ -32,7 +35,6 @@ export async function openGlScene(
   try {
     requireAlone();
     if (isGenerator(request) || request.chain?.length) throw cannotShow('a generator', reason);
-    if (isStreamed(request)) throw cannotShow('a streamed scene', reason);
     if (!live().ownsControls()) throw cannotShow('a post-processor', reason);
     const previews = new Previews(options);
     const scene = await loader

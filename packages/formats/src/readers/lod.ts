@@ -13,13 +13,15 @@ import { noParts } from './sog.js';
  * beyond the last give the coarsest) or at all of them (`all`), with its environment. The coarsest level is its preview.
  */
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
-  const { name, level = 0 } = source;
+  const { name, level = 0, mostSplats = Infinity } = source;
   const meta = parseLodMeta(source);
   const open = source.openPart ?? noParts(name, 'scene.zip');
   const coarsest = runsAtLevel(meta, meta.levels - 1);
-  const runs = level === 'all' ? runsAtAllLevels(meta) : runsAtLevel(meta, Math.min(level, meta.levels - 1));
   const around = await readEnvironment(meta, open, source);
   const countOf = (some: readonly NodeRun[]): number => some.reduce((sum, { count }) => sum + count, 0);
+  let own = Math.min(level === 'all' ? 0 : level, meta.levels - 1);
+  while (own < meta.levels - 1 && countOf(runsAtLevel(meta, own)) > mostSplats) own++;
+  const runs = level === 'all' ? runsAtAllLevels(meta) : runsAtLevel(meta, own);
   if (previewWanted(source, countOf(runs)) && countOf(coarsest) < countOf(runs) / 2) {
     const parts = [...(await readRuns(coarsest, meta, open, source)), ...around];
     if (parts.length > 0) await source.onPreview?.(mergeClouds(parts, source));

@@ -1,13 +1,14 @@
-import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
 import {
-  constants,
-  type DetailManifest,
-  pageLayout,
-  QUANTIZED_CHUNK_WORDS,
-  readRow,
-  ROW_CODES,
-  shReader,
-} from '@gaussian-splat/renderer/tools';
+  quaternionOfMatrix,
+  shCoefficientCount,
+  symmetricEigen,
+  type GaussianCloud,
+  type Vector3,
+} from '@gaussian-splat/core';
+import { constants } from '../generated/shaders.js';
+import { shReader } from '../pack/unpack.js';
+import { pageLayout, type DetailManifest } from './manifest.js';
+import { QUANTIZED_CHUNK_WORDS, readRow, ROW_CODES } from './quantized-geometry.js';
 
 const { CULL_GROUP, QUANTIZED_HEAD_ROWS, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO, QUANTIZED_OPAQUE } = constants;
 
@@ -18,9 +19,11 @@ export interface PageChunks {
   /** Chunks of the file, and which of them are meant. */
   readonly of: number;
   readonly chunks: readonly number[];
+  /** World units, added to every position; default none. */
+  readonly translate?: Vector3;
 }
 
-/** The splats of some chunks as a cloud, those left out that nothing shows of: for tools that ask how near pages are to the scene that they were made of. */
+/** The splats of some chunks as a cloud, those left out that nothing shows of: for renderers without pages, and for tools that ask how near pages are to the scene that they were made of. */
 export function cloudOfChunks(
   scene: Pick<DetailManifest, 'shDegree' | 'shPrecision' | 'antialiased' | 'filterVariance' | 'origin'>,
   parts: readonly PageChunks[],
@@ -33,7 +36,7 @@ export function cloudOfChunks(
   const sh = new Float32Array(numbers * most);
   let count = 0;
   const codes = new Int32Array(ROW_CODES);
-  for (const { words, of, chunks } of parts) {
+  for (const { words, of, chunks, translate = [0, 0, 0] } of parts) {
     const layout = pageLayout({ shDegree, shPrecision, geometry: 'quantized' }, of);
     const geometryAt = layout.chunks + layout.details;
     const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
@@ -45,7 +48,8 @@ export function cloudOfChunks(
         readRow(words, at + 4 * (QUANTIZED_HEAD_ROWS + k), codes);
         if (codes[9] === 0) continue;
         for (let axis = 0; axis < 3; axis++) {
-          positions[3 * count + axis] = floats[at + axis] + floats[at + 4 + axis] * codes[axis];
+          const place = floats[at + axis] + floats[at + 4 + axis] * codes[axis];
+          positions[3 * count + axis] = place + translate[axis];
         }
         const sizes = [0, 1, 2].map((n) => 2 ** (floats[at + 3] + floats[at + 7] * codes[3 + n]));
         const { values, vectors } = symmetricEigen(covarianceOf(sizes, codes));

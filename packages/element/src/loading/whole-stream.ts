@@ -1,0 +1,148 @@
+/** Loaded by the worker for streamed scenes that are drawn without pages: as much of them as fits is read, the coarsest first. */
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { partRequest } from '@gaussian-splat/core/fetch';
+import { fetchScene, openPartAt, readScene, type FetchSceneOptions, type LoadLimits } from '@gaussian-splat/formats';
+import type { DetailManifest } from '@gaussian-splat/renderer';
+import {
+  cloudOfChunks,
+  constants,
+  decodePage,
+  finestPages,
+  listPages,
+  pageLayout,
+  type InstanceList,
+} from '@gaussian-splat/renderer/tools';
+import type { LoadListeners } from './load-scene.js';
+import { openManifest } from './open-manifest.js';
+import type { LoadedScene, SceneRequest } from './protocol.js';
+
+/** Bytes that a splat takes with harmonics of degree 3 in 8 bits, and for frames: see `glBytes`. */
+const SPLAT_BYTES = 4 * (8 + 14 + 9);
+/** A preview is shown when there are so many times as many pages as in the one before. */
+const GROWTH = 8;
+
+/** What the loading of a scene has at hand. */
+export interface StreamLoad extends Pick<LoadListeners, 'onProgress' | 'onPreview' | 'onReading'> {
+  readonly name: string;
+  readonly limits: () => LoadLimits;
+  /** Of each file. */
+  readonly options: () => FetchSceneOptions;
+  readonly pack: (cloud: GaussianCloud) => LoadedScene;
+}
+
+/**
+ * Loads the finest part of a `lod-meta.json` or `detail.json` that fits. Throws as `loadScene` does.
+ * @param memory bytes that it may take on the GPU
+ */
+export async function loadWholeStream(
+  request: SceneRequest,
+  memory: number,
+  signal: AbortSignal,
+  load: StreamLoad,
+): Promise<LoadedScene> {
+  const mostSplats = Math.max(constants.CULL_GROUP, Math.floor(memory / SPLAT_BYTES));
+  if (!new URL(request.url).pathname.endsWith('detail.json')) return loadSog(request, mostSplats, signal, load);
+  return loadPages(request, mostSplats, signal, load);
+}
+
+async function loadSog(
+  { url }: SceneRequest,
+  mostSplats: number,
+  signal: AbortSignal,
+  { name, limits, options, pack, onPreview, onReading }: StreamLoad,
+): Promise<LoadedScene> {
+  const bytes = await fetchScene(url, options());
+  onReading?.(true);
+  const cloud = await readScene(bytes, {
+    ...{ name, signal, mostSplats, openPart: openPartAt(url, options), ...limits() },
+    onPreview: onPreview && ((preview) => onPreview(pack(preview))),
+  });
+  return pack(cloud);
+}
+
+/** Reads pages from the roots down until there is no room for the next one. */
+async function loadPages(
+  request: SceneRequest,
+  mostSplats: number,
+  signal: AbortSignal,
+  { options, pack, onProgress, onPreview, onReading }: StreamLoad,
+): Promise<LoadedScene> {
+  const manifest = await openManifest(request, signal, onProgress);
+  if (manifest.geometry === undefined) throw ofVersion1(request.url);
+  const list = listPages(manifest);
+  const pages = finestPages(list, Math.floor(mostSplats / constants.CULL_GROUP));
+  const words = new Map<string, Uint32Array<ArrayBuffer>>();
+  let fetched = 0;
+  let due = 1;
+  for (const [k, page] of pages.entries()) {
+    signal.throwIfAborted();
+    const { file } = list.place(page);
+    if (!words.has(file.file)) {
+      const { maxBytes = Infinity, ...rest } = options();
+      const part = partRequest(file.file, request, request.limits?.origins);
+      const bytes = await fetchScene(part.url, {
+        ...rest,
+        credentials: part.credentials,
+        maxBytes: maxBytes - fetched,
+      });
+      fetched += bytes.length;
+      words.set(file.file, await wordsOf(part.url, bytes, file, manifest));
+    }
+    if (onPreview === undefined || k + 1 < due || k + 1 === pages.length) continue;
+    onReading?.(true);
+    onPreview(pack(cloudOf(manifest, list, pages.slice(0, k + 1), words)));
+    onReading?.(false);
+    due = GROWTH * (k + 1);
+  }
+  onReading?.(true);
+  return { ...pack(cloudOf(manifest, list, pages, words)), order: manifest.order };
+}
+
+/** The words of a file, as the GPU of a streamed scene reads them. */
+async function wordsOf(
+  where: string,
+  bytes: Uint8Array,
+  { chunks, upper }: { readonly chunks: number; readonly upper: number },
+  manifest: DetailManifest,
+): Promise<Uint32Array<ArrayBuffer>> {
+  const { coding, shDegree } = manifest;
+  // In a buffer of its own, whose length is that of the file.
+  const own = new Uint8Array(bytes);
+  if (coding) return new Uint32Array(await decodePage(where, own, { chunks, upper, shDegree, coding }));
+  const { total } = pageLayout(manifest, chunks);
+  if (own.length === 4 * total) return new Uint32Array(own.buffer);
+  throw new GaussianSplatError(own.length < 4 * total ? 'decode/truncated' : 'decode/corrupt', {
+    where,
+    expected: `${4 * total} bytes`,
+    found: String(own.length),
+    remedy: 'write the folder again with gaussian-splat detail, and upload all files of it',
+  });
+}
+
+/** The chunks of some pages that no other of them is the detail of. */
+function cloudOf(
+  manifest: DetailManifest,
+  list: InstanceList,
+  pages: readonly number[],
+  words: ReadonlyMap<string, Uint32Array<ArrayBuffer>>,
+): GaussianCloud {
+  const shown = new Set(pages);
+  const parts = pages.map((page) => {
+    const { file, first, chunks } = list.place(page);
+    const below = list.children.subarray(list.firstChunk[page], list.firstChunk[page] + chunks);
+    const own = Array.from({ length: chunks }, (_, c) => c).filter((c) => !shown.has(below[c]));
+    return {
+      ...{ words: words.get(file.file)!, of: file.chunks, translate: list.translate(page) },
+      chunks: own.map((c) => first + c),
+    };
+  });
+  return cloudOfChunks(manifest, parts);
+}
+
+const ofVersion1 = (where: string): GaussianSplatError =>
+  new GaussianSplatError('decode/unsupported', {
+    where,
+    expected: 'pages of version 2 or 4, where WebGL 2 draws',
+    found: 'version 1',
+    remedy: 'write the folder again with gaussian-splat detail',
+  });
