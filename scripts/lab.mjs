@@ -10,6 +10,7 @@ const IN_CHROMIUM = {
   frontier: ['scripts/frontier/run-frontier.mjs'],
   soak: ['scripts/soak/run-soak.mjs'],
   attack: ['scripts/attack/run-attack.mjs'],
+  load: ['scripts/bench/run-load.mjs'],
 };
 const IN_NODE = {
   fuzz: ['--import', 'tsx', 'tests/stability/fuzz/run-fuzz.ts'],

@@ -5,11 +5,13 @@ import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { USUAL_STEPS } from '@gaussian-splat/economise/pages';
+import { finestPages } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import { deflate } from '../../packages/cli/src/lib/encoders.mjs';
 import { loadScene } from '../../packages/element/src/loading/load-scene.js';
 import type { LoadedScene } from '../../packages/element/src/loading/protocol.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
+import { emptyList, putBelow, type PagePlace } from '../../packages/renderer/src/streaming/page-list.js';
 import { detailFolder } from '../support/detail-folder.js';
 import { lodFolder } from '../support/lod-folder.js';
 
@@ -113,4 +115,16 @@ test('a page that is missing or too short is said by name', async () => {
   files.delete(path);
   await assert.rejects(load('plain/detail.json', ENOUGH), { code: 'network/status' });
   files.set(path, bytes);
+});
+
+test('pages that add nothing are not read without end', () => {
+  const count = 1_000_000;
+  const chain = emptyList(new Uint32Array(count).fill(1));
+  for (let page = 1; page < count; page++) putBelow(chain, page, page - 1, 0, 1);
+  const place = (): PagePlace => ({ file: { file: 'a', chunks: 1, upper: 1 }, first: 0, chunks: 1 });
+  const start = process.cpuUsage();
+  const pages = finestPages({ ...chain, place, translate: () => [0, 0, 0] }, 100);
+  const { user } = process.cpuUsage(start);
+  assert.ok(pages.length <= 201, `${pages.length} pages`);
+  assert.ok(user < 3e6, `${user / 1000} ms`);
 });

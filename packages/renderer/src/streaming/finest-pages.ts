@@ -8,10 +8,14 @@ export function finestPages(list: InstanceList, mostChunks: number): number[] {
   const { count, parent, parentChunks } = list;
   const depths = new Uint32Array(count);
   for (let page = 0; page < count; page++) if (parent[page] !== NONE) depths[page] = depths[parent[page]] + 1;
-  const order = Array.from({ length: count }, (_, page) => page).sort((a, b) => depths[a] - depths[b] || a - b);
+  // Numbers with the depth in front of them, for the sort of numbers is much the fastest.
+  const order = Float64Array.from(depths, (depth, page) => depth * 2 ** 32 + page).sort();
   const chosen = new Set<number>();
   let chunks = 0;
-  for (const page of order) {
+  for (const key of order) {
+    // A page that adds nothing costs time all the same.
+    if (chosen.size > 2 * mostChunks) break;
+    const page = key % 2 ** 32;
     const isRoot = parent[page] === NONE;
     if (!isRoot && !chosen.has(parent[page])) continue;
     const more = list.place(page).chunks - (isRoot ? 0 : parentChunks[page]);
