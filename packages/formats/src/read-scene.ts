@@ -23,7 +23,7 @@ export interface ReadSceneOptions extends LoadLimits {
   readonly openPart?: OpenPart;
   /** Level of detail that is read of a streamed scene, 0 (default) the finest; `all` reads all of them, for renderers that choose: see `GaussianCloud.levelRuns`. */
   readonly level?: number | 'all';
-  /** Of streamed SOG the finest level with at most so many splats is read, and the coarsest if none has so few. */
+  /** Splats of the finest level that is read of streamed SOG, at most; where all levels have more, the coarsest is read. */
   readonly mostSplats?: number;
   /**
    * Called, if the scene is large and its format allows, with some of its splats, spread over all of it and larger to stand

@@ -2,7 +2,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchScene, LoadBudget } from '@gaussian-splat/formats';
 import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
-import { fileName, named, throttled } from './load-scene.js';
+import { fileName, named, throttled } from './load-helpers.js';
 import type { FileRequest, ProgressListener } from './protocol.js';
 
 export { decodePage } from '@gaussian-splat/renderer/tools';

@@ -1,7 +1,7 @@
 import { NONE, type InstanceList } from './page-list.js';
 
 /**
- * The pages that show a scene best within so many chunks, those above others first: level by level from the roots down, until the next page has no room. A page takes the place of the
+ * The pages that show a scene best within a number of chunks, those above others first: level by level from the roots down, until the next page has no room. A page takes the place of the
  * chunks that it is the detail of. The roots are always among them.
  */
 export function finestPages(list: InstanceList, mostChunks: number): number[] {
