@@ -169,6 +169,28 @@ describe('a post-processor', () => {
     tensor.destroy();
   });
 
+  it('that keeps a state runs again for the same image until it has converged', async () => {
+    const reading: Promise<Uint8Array>[] = [];
+    const post = await PostProcessor.open({ url: `${FIXTURES}post-temporal.onnx` }, device, {
+      onError: reportError,
+      compare: false,
+      onPicture: ({ buffer }) => reading.push(readBuffer(device, buffer)),
+    });
+    const { tensor, pixels } = await tensorOf(32, 24, { width: 32, height: 24, dtype: 'float32' });
+    for (let i = 0; i < 40; i++) {
+      post.request(tensor);
+      await post.idle;
+    }
+    const expected = resampled(pixels, [32, 24], [32, 24], 'stretch');
+    const errorOf = async (run: number): Promise<number> =>
+      relativeError(numbersOf(await reading[run], 'float32').slice(0, expected.length), expected);
+    assertEqual(reading.length, 33, 'runs');
+    const [first, last] = [await errorOf(0), await errorOf(32)];
+    assert(first > 0.79 && last < 1e-3, `relative error ${first} of the first run, ${last} of the last`);
+    post.close();
+    tensor.destroy();
+  });
+
   it('makes no buffer and reads nothing back once it is warm', async () => {
     const frame = new FilteredFrame(device, 48, 32);
     let pictures = 0;

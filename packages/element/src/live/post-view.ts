@@ -179,7 +179,7 @@ export class PostView implements FrameFilter {
       this.#request.onError(error);
     }
     void this.#post.idle.then(() => {
-      if (this.#handed !== this.#drawn) this.#request.onChange();
+      if (this.#handed !== this.#drawn || this.#post.isConverging) this.#request.onChange();
     });
   }
 
