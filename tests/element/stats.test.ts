@@ -1,6 +1,7 @@
 /** What `stats` says of a scene, in sentences for people. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { faultsOf } from '@gaussian-splat/renderer/tools';
 import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
 import { statsOf, type StatsContext } from '../../packages/element/src/stats.js';
 
@@ -9,6 +10,7 @@ const scene = {
   detail: {},
   bounds: {},
   warnings: [],
+  place: { context: {} },
 } as unknown as LoadedGaussians;
 
 test('splats for which the device has no room are told of, after they were counted', () => {
@@ -25,4 +27,20 @@ test('splats for which the device has no room are told of, after they were count
     statsOf([scene], { ...context, counts: { drawn: 60, left, contributed: 9 } }).why.join();
   assert.equal(whyOf(0), '');
   assert.match(whyOf(1200), /^1200 splats are not drawn: the GPU allows no buffer/);
+});
+
+test('what the self-test found wrong is told of', () => {
+  const { context } = scene.place;
+  faultsOf(context).push('The self-test finds errors of this GPU: parallel prefix sums.');
+  const pace = { moving: 'whole' } as unknown as StatsContext['dynamicQuality'];
+  const known = {
+    quality: 'default',
+    dynamicQuality: pace,
+    isPreview: false,
+    frameBytes: 0,
+    pixels: 0,
+    parts: [],
+  } as const;
+  assert.deepEqual(statsOf([scene], { ...known, counts: undefined }).why, faultsOf(context));
+  assert.deepEqual(faultsOf({}), []);
 });

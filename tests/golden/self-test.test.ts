@@ -2,8 +2,8 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
-import type { RasterizerName } from '@gaussian-splat/renderer';
-import type { Threads } from '@gaussian-splat/renderer/tools';
+import { autotune, type RasterizerName } from '@gaussian-splat/renderer';
+import { faultsOf, type Threads } from '@gaussian-splat/renderer/tools';
 import { isLab } from '../support/extent.js';
 import { miscompiling, type Miscompilation } from '../support/miscompilation.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
@@ -223,6 +223,20 @@ for (const { what, threads = 'serial', rasterizer = 'quads', ...fault } of isLab
     assert.ok(befallen.length > 0, `${fault.shader.source} has "${fault.from}"`);
   });
 }
+
+test(
+  'what is broken is named, and another variant draws',
+  { skip: !isLab && 'tiles take SwiftShader seconds to compile' },
+  async () => {
+    const slopeless = MUTANTS.find(({ shader }) => shader.source.includes('rasterize_quads') && shader)!;
+    const { device } = miscompiling(await nodeDevice(), [slopeless]);
+    assert.equal((await autotune(device, { store: null })).rasterizer, 'tiles');
+    assert.match(
+      faultsOf(device).join(),
+      /errors of this GPU: frames of quads in rgba16float, serial\. Other variants draw/,
+    );
+  },
+);
 
 test('the self-test passes where nothing is broken, in a few milliseconds', async () => {
   const device = await nodeDevice();

@@ -1,4 +1,5 @@
 import type { Vector3 } from '@gaussian-splat/core';
+import { faultsOf } from '@gaussian-splat/renderer/tools';
 import type { QualityChoice } from './attributes.js';
 import type { DynamicQualityReport } from './controllers/pace-controller.js';
 import type { SceneState } from './controllers/scene-controller.js';
@@ -122,12 +123,13 @@ export function statsOf(
       ...whyDetail(quality, detail),
       ...whyPace(quality, dynamicQuality),
       ...whyLeft(counts?.left ?? 0),
+      ...faultsOf(scenes[0].place.context),
     ],
   };
 }
 
 function whyPreview(isPreview: boolean): string[] {
-  return isPreview ? ['The scene is still loading; this is a part of it.'] : [];
+  return isPreview ? ['The scene is still loading.'] : [];
 }
 
 function whyDropped(dropped: number): string[] {

@@ -68,3 +68,4 @@ export { readBack, readBackWith, type ReadPart } from './gpu/read-back.js';
 export { sortByKey } from './pack/radix-sort.js';
 export { RankedHeap } from './ranked-heap.js';
 export { untilItHasRoom } from './until-it-has-room.js';
+export { faultsOf } from './variants.js';

@@ -29,6 +29,9 @@ export function remember(device: GPUDevice, variants: Variants): void {
 /** What is known to suit a device by now. */
 export const variantsOf = (device: GPUDevice): Variants => known(device).variants;
 
+/** Sentences on what the self-test found wrong on a device, whose variants are not used; empty for a WebGL context. */
+export const faultsOf = (device: object): string[] => perDevice(device, 'faults', () => []);
+
 /** Settings with every `auto` replaced by what suits the device. */
 export function settle(variants: Variants, levers: RenderSettings): RenderSettings & Variants {
   const own = levers.order === 'pixel' ? 'tiles' : variants.rasterizer;

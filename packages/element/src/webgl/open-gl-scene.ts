@@ -1,4 +1,5 @@
 /** Loaded only where a page has no WebGPU, or asks for WebGL by name. */
+import { faultsOf } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { isGenerator, isStreamed, type OpenOptions } from '../gpu/open-scene.js';
@@ -26,6 +27,7 @@ export async function openGlScene(
   const request = { ...asked, levels: false, streamBytes };
   const lease = acquireGl();
   if (lease === undefined) throw reason ?? noWebGl();
+  if (reason instanceof Error) faultsOf(lease.gl)[0] = `WebGL 2 draws: ${reason.message}`;
   const { signal, onProgress, beforeUpload, loader, live } = options;
   const requireAlone = (): void => {
     const { element } = live();

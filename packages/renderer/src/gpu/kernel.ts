@@ -183,10 +183,10 @@ export const TEXTURE_USAGE = {
   renderAttachment: 0x10,
 } as const;
 
-const cache = new WeakMap<GPUDevice, Map<string, unknown>>();
+const cache = new WeakMap<object, Map<string, unknown>>();
 
 /** Something that is made once for a device (a pipeline, say) and shared by all renderers on it. */
-export function perDevice<T>(device: GPUDevice, key: string, make: () => T): T {
+export function perDevice<T>(device: object, key: string, make: () => T): T {
   let made = cache.get(device);
   if (made === undefined) cache.set(device, (made = new Map()));
   if (!made.has(key)) made.set(key, make());
