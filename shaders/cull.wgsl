@@ -15,6 +15,7 @@
 var<workgroup> bits: array<atomic<u32>, WORDS_PER_GROUP>;
 var<workgroup> nearest_inverted: atomic<u32>;
 var<workgroup> farthest: atomic<u32>;
+var<workgroup> covered: atomic<u32>;
 
 @compute @workgroup_size(CULL_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -29,11 +30,12 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (!is_usable(found)) {
       atomicAdd(&gathered[UNUSABLE], 1u);
     } else {
-      let depth = visible_depth(found, share);
-      if (depth > 0.0) {
+      let part = visible_part(found, share);
+      if (part.depth > 0.0) {
         atomicOr(&bits[lane / 32u], 1u << (lane % 32u));
-        atomicMax(&nearest_inverted, ~bitcast<u32>(depth));
-        atomicMax(&farthest, bitcast<u32>(depth));
+        atomicMax(&nearest_inverted, ~bitcast<u32>(part.depth));
+        atomicMax(&farthest, bitcast<u32>(part.depth));
+        if (part.covered > 0u) { atomicAdd(&covered, part.covered); }
       }
     }
   }
@@ -46,6 +48,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (count > 0u) {
       atomicMax(&gathered[NEAREST_INVERTED], atomicLoad(&nearest_inverted));
       atomicMax(&gathered[FARTHEST], atomicLoad(&farthest));
+      let shares = (atomicLoad(&covered) + COVERED_UNIT / 2u) / COVERED_UNIT;
+      if (shares > 0u) { atomicAdd(&gathered[COVERED], shares); }
     }
   }
 }

@@ -22,17 +22,19 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var bits = 0u;
   var nearest = 0xffffffffu;
   var farthest = 0u;
+  var covered = 0u;
   for (var k = 0u; k < 32u && first + k < view.splat_count; k++) {
     let found = gaussian_at(first + k);
     if (!is_usable(found)) {
       atomicAdd(&gathered[UNUSABLE], 1u);
       continue;
     }
-    let depth = visible_depth(found, share);
-    if (depth > 0.0) {
+    let part = visible_part(found, share);
+    if (part.depth > 0.0) {
       bits |= 1u << k;
-      nearest = min(nearest, bitcast<u32>(depth));
-      farthest = max(farthest, bitcast<u32>(depth));
+      nearest = min(nearest, bitcast<u32>(part.depth));
+      farthest = max(farthest, bitcast<u32>(part.depth));
+      covered += part.covered;
     }
   }
   visible_bits[group * WORDS_PER_GROUP + lane] = bits;
@@ -40,5 +42,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     atomicAdd(&group_counts[group], countOneBits(bits));
     atomicMax(&gathered[NEAREST_INVERTED], ~nearest);
     atomicMax(&gathered[FARTHEST], farthest);
+    atomicAdd(&gathered[COVERED], (covered + COVERED_UNIT / 2u) / COVERED_UNIT);
   }
 }

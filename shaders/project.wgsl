@@ -36,6 +36,13 @@ fn depth_key(depth: f32) -> u32 {
   return u32(min(share, 1.0) * f32((1u << view.key_bits) - 1u));
 }
 
+// Where the splats cover the image more often than they may, those are left out that take more than their equal part: the rest stays within the limit.
+fn is_left_out(e: Ellipse) -> bool {
+  if (gathered[COVERED] <= view.most_covered) { return false; }
+  let part = f32(COVERED_UNIT) * f32(view.most_covered) / f32(max(plan.visible, 1u));
+  return f32(covered_share(view, e, covered_box(view, e))) > part;
+}
+
 @compute @workgroup_size(PROJECT_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let page = plan.pages[view.page];
@@ -45,7 +52,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let i = survivors[slot] - view.first_group * CULL_GROUP;
   var g = unpack_gaussian(gaussian_at(i));
   g.opacity = shared_opacity(thinned_opacity(g.opacity, view.opacity), chunk_shares[view.first_group + i / CULL_GROUP]);
-  let e = project_ellipse(view, g);
+  var e = project_ellipse(view, g);
+  if (is_left_out(e)) { e.opacity = 0.0; }
   let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
   let color = splat_sh_color(i, normalize(toward));
   splats[slot] = pack_splat(e, color);

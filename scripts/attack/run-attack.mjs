@@ -28,10 +28,11 @@ const USAGE = `usage: npm run lab:attack -- [FOLDER (default ../shared/cases/att
 Reads every scene file of a folder in Node, and shows each in Chromium, files named mesh-* and csp-* as meshes, with an honest scene of 400 splats (honest.ply of the folder, or of
 ../attack) half a second later, and again when it is removed; both with a heap of 300 MB. A folder within the folder is a streamed scene. Prints the result, the time, the most memory of
 the page's process and of the GPU's (on Linux) above an empty page, and the requests to another origin. Ends with an error if one crashes, ends without a named error, takes more than
-400 MB of a process, asks another origin, or delays the honest scene by more than a second.`;
+400 MB of a process, keeps the page's thread for more than 100 ms at once, asks another origin, or delays the honest scene by more than a second.`;
 const HEAP = '--max-old-space-size=300';
 const MAX_PEAK = 400e6;
 const MAX_WAIT_MS = 1_000;
+const MAX_TASK_MS = 100;
 /** The port of the other origin that the cases name. */
 const FOREIGN_PORT = 18_602;
 
@@ -136,22 +137,23 @@ const foreign = createServer((_, response) => {
 }).listen(FOREIGN_PORT);
 const megabytes = (bytes) => (bytes === undefined || Number.isNaN(bytes) ? '?' : `${Math.round(bytes / 1e6)} MB`);
 console.log(
-  'file | Node: result, CPU, memory | Chromium: result, time, memory of page and GPU process, longest standstill | honest scene beside it, later (alone) | foreign requests',
+  'file | Node: result, CPU, memory | Chromium: result, time, memory of page and GPU process, longest standstill, longest task of the page | honest scene beside it, later (alone) | foreign requests',
 );
 for (const file of files) {
   const node = inNode(file);
   foreignRequests = 0;
   const found = await inChromium(file, port);
-  const { result, ms, peak, gpuPeak, standstill, beside, alone, besideResult, later, laterResult } = found;
+  const { result, ms, peak, gpuPeak, standstill, task, beside, alone, besideResult, later, laterResult } = found;
   const first = node ? `${node.result}, ${Math.round(node.cpuMs)} ms, ${megabytes(node.peak)}` : 'not read there';
   console.log(
-    `${file} | ${first} | ${result}, ${ms} ms, ${megabytes(peak)} + ${megabytes(gpuPeak)}, ${standstill} ms | ` +
+    `${file} | ${first} | ${result}, ${ms} ms, ${megabytes(peak)} + ${megabytes(gpuPeak)}, ${standstill} ms, ${task} ms | ` +
       `${beside} ms, ${later} ms (${alone} ms) | ${foreignRequests}`,
   );
   const isNamed = !/unnamed|undefined|nothing for/.test(`${node?.result} ${result}`.replace(/^undefined /, ''));
   if (!isNamed) faults.push(`${file}: no named error (${result})`);
   for (const [what, bytes] of Object.entries({ page: peak, GPU: gpuPeak }))
     if (bytes > MAX_PEAK) faults.push(`${file}: ${megabytes(bytes)} of the process of the ${what}`);
+  if (task > MAX_TASK_MS) faults.push(`${file}: a task of ${task} ms on the page's thread`);
   for (const [when, took, came] of [
     ['beside it', beside, besideResult],
     ['later', later, laterResult],

@@ -4,6 +4,7 @@
 #import shared/gaussian
 #import shared/falloff
 #import shared/ellipse
+#import shared/gathered
 
 // Variance that the low-pass filter of 3D Gaussian Splatting adds, in px² of the frame that is shown.
 const DILATION = 0.3;
@@ -64,10 +65,23 @@ fn half_extent(view: View, e: Ellipse) -> vec2f {
   return radius * vec2f(e.sigma_x, sqrt(sheared * sheared + e.sigma_v * e.sigma_v));
 }
 
-// True if the box of the ellipse holds the centre of at least one pixel of the image.
-fn covers_a_pixel(view: View, e: Ellipse) -> bool {
+// Columns and rows of the image whose pixel centres lie in the box of the ellipse; 0 in both where there is none.
+fn covered_box(view: View, e: Ellipse) -> vec2f {
   let extent = half_extent(view, e);
   let first = max(ceil(e.center - extent - 0.5), vec2f(0.0));
   let last = min(floor(e.center + extent - 0.5), view.viewport - 1.0);
-  return e.opacity >= ALPHA_MIN && all(first <= last);
+  return select(vec2f(0.0), last - first + 1.0, e.opacity >= ALPHA_MIN && all(first <= last));
+}
+
+fn covers_a_pixel(view: View, e: Ellipse) -> bool {
+  return covered_box(view, e).x > 0.0;
+}
+
+// Share of the image that a rasterizer visits for an ellipse with this box, in SHARE_UNITs: the quad around it, as far as
+// that lies within the box.
+fn covered_share(view: View, e: Ellipse, box: vec2f) -> u32 {
+  let diameter = 2.0 * cutoff_radius(e.opacity);
+  let quad = (diameter * e.sigma_x) * (diameter * e.sigma_v);
+  let pixels = min(box.x * box.y, max(quad, 1.0));
+  return u32(f32(SHARE_UNIT) * pixels / (view.viewport.x * view.viewport.y));
 }

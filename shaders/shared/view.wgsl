@@ -47,6 +47,8 @@ struct View {
   is_orthographic: u32,
   // Along which such rays go, in page-local coordinates.
   axis: vec3f,
+  // How often the splats of a frame may cover it, in COVERED_UNITs.
+  most_covered: u32,
 }
 
 // From page-local coordinates to the camera's axes. What lies near the eye is subtracted from it first, which is exact: far from the page's origin both are

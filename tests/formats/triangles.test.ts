@@ -82,3 +82,57 @@ const REFUSED: Readonly<Record<string, [file: object, message: RegExp]>> = {
 };
 for (const [what, [file, message]] of Object.entries(REFUSED))
   test(`refused by name: ${what}`, () => assert.rejects(read(file), message));
+
+const PLY_HEADER = (encoding: string, vertices: string, faces: number, count = 4): string =>
+  `ply\nformat ${encoding} 1.0\nelement vertex ${count}\n${vertices}element face ${faces}\nproperty uchar flags\nproperty list uchar int vertex_indices\nend_header\n`;
+const XYZ = 'property float x\nproperty float y\nproperty float z\n';
+const RGB = 'property uchar red\nproperty uchar green\nproperty uchar blue\n';
+const text = (content: string): Uint8Array => new TextEncoder().encode(content);
+const floatsIn = (view: TriangleFile['views'][number]): number[] => [...new Float32Array((view as Uint8Array).slice().buffer)];
+
+test('a PLY mesh: polygons as fans, colors linear, either byte order, and text', async () => {
+  const rows = ['0 0 0 255 0 0', '1 0 0 0 255 0', '1 1 0 0 0 255', '0 1 nan 188 188 188'];
+  const ascii = text(`${PLY_HEADER('ascii', XYZ + RGB, 3)}${rows.join('\n')}\n7 4 0 1 2 1\n7 3 0 1 3\n7 2 0 1\n`);
+  const file = await read(ascii);
+  // Vertex 3 has no place: its triangle is left out.
+  assert.equal(file.triangles, 2);
+  assert.deepEqual([...new Uint32Array((file.views[2] as Uint8Array).slice().buffer)], [0, 1, 2, 0, 2, 1]);
+  assert.deepEqual(floatsIn(file.views[0]).slice(0, 9), [0, 0, 0, 1, 0, 0, 1, 1, 0]);
+  const colors = new Uint16Array((file.views[1] as Uint8Array).slice().buffer);
+  assert.deepEqual([...colors.slice(0, 4), Math.round(colors[12] / 655.35)], [65_535, 0, 0, 65_535, 50]);
+  for (const little of [true, false]) {
+    const head = text(PLY_HEADER(little ? 'binary_little_endian' : 'binary_big_endian', XYZ, 1));
+    const body = new DataView(new ArrayBuffer(48 + 2 + 16));
+    [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0].forEach((value, i) => body.setFloat32(4 * i, value, little));
+    body.setUint8(49, 4);
+    [0, 1, 2, 3].forEach((value, i) => body.setInt32(50 + 4 * i, value, little));
+    const binary = await read(new Uint8Array([...head, ...new Uint8Array(body.buffer)]));
+    assert.deepEqual([binary.triangles, binary.byteLength], [2, 48 + 24]);
+    assert.deepEqual(binary.json.accessors, [
+      { componentType: 5126, count: 4, type: 'VEC3', min: [0, 0, 0], max: [1, 1, 0], bufferView: 0 },
+      { componentType: 5125, count: 6, type: 'SCALAR', bufferView: 1 },
+    ]);
+  }
+});
+
+test('a PLY that is no mesh, or asks for more than it has, is refused by name', async () => {
+  const corner = '0 0 0\n'.repeat(4);
+  const cases: [string, RegExp][] = [
+    [`ply\nformat ascii 1.0\nelement vertex 1\n${XYZ}end_header\n0 0 0\n`, /faces with vertex_indices.*decode\/empty/],
+    [`${PLY_HEADER('ascii', XYZ, 1)}${corner}0 3 0 1 4\n`, /face 0: expected a vertex from 0 to 3, found 4.*decode\/corrupt/],
+    [`${PLY_HEADER('ascii', XYZ, 1)}${corner}0 3 0 -1 2\n`, /decode\/corrupt/],
+    [`${PLY_HEADER('ascii', XYZ, 2)}${corner}0 3 0 1 2\n`, /decode\/truncated/],
+    [PLY_HEADER('binary_little_endian', XYZ, 1, 50_000_000), /decode\/truncated/],
+    [`${PLY_HEADER('ascii', XYZ, 1)}${corner}0 1000000 0 1 2\n`, /decode\/truncated/],
+  ];
+  for (const [file, message] of cases) await assert.rejects(read(text(file)), ({ message: found }: Error) => message.test(found), file.slice(0, 40));
+});
+
+test('faces of a PLY with very many sides cost what they weigh', async () => {
+  // A fan of a million triangles: 2 bytes each.
+  const fan = ` 0 1 2${' 1 2'.repeat(500_000)}`;
+  const file = text(`${PLY_HEADER('ascii', XYZ, 1)}${'0 0 0\n'.repeat(4)}0 1000003${fan}\n`);
+  const begin = performance.now();
+  assert.equal((await read(file)).triangles, 1_000_001);
+  assert.ok(performance.now() - begin < 8_000);
+});

@@ -55,3 +55,20 @@ function movedBy(m: ArrayLike<number>, [x, y, z]: readonly [number, number, numb
     i < 12 && i % 4 === 3 ? value - (m[i - 3] * x + m[i - 2] * y + m[i - 1] * z) : value,
   );
 }
+
+test('the sum of the areas on screen says how often the image is covered', () => {
+  const positions = new Float32Array(3 * 3_000);
+  const areas = new Float32Array(3_000).fill(100);
+  const splats = new SplatOrder(positions, areas);
+  const order = new Uint32Array(4_000);
+  splats.sort(orderView(camera, [0, 0, 0]), order);
+  assert.equal(splats.covered, 3_000, 'each covers all of it');
+  // From 1,000 times as far a millionth of what it was, and beside the image nothing.
+  const far = cameraAt([300, -1000, -3000], [0, 0, 1]);
+  splats.sort(orderView(far, [0, 0, 0]), order);
+  assert.ok(splats.covered < 1, `${splats.covered} from afar`);
+  areas.fill(0.5);
+  const beside = new SplatOrder(positions.map((_, i) => (i % 3 === 0 ? 40 : 0)), areas);
+  beside.sort(orderView(camera, [0, 0, 0]), order);
+  assert.ok(beside.covered < 300, `${beside.covered} beside the image`);
+});

@@ -35,6 +35,8 @@ export type ErrorCode =
   | 'unsupported/no-webgpu'
   | 'unsupported/no-adapter'
   | 'unsupported/limits'
+  /** A script of the page has replaced a function of the language by another. */
+  | 'unsupported/page'
   /** Every variant of the renderer fails its known answer on this device: its shader compiler or driver errs. */
   | 'unsupported/wrong-image'
   /** There is no WebGPU, and WebGL 2 in its place cannot show what is asked for, or fails. */

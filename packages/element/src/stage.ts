@@ -245,6 +245,7 @@ export class Stage
       counts: this.#counts,
       isPreview,
       frameBytes: this.view.painter?.byteLength ?? 0,
+      pixelShare: this.view.painter?.pixelShare,
       pixels: levels.detail,
       parts,
     });

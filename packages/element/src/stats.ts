@@ -80,6 +80,8 @@ export interface StatsContext {
   readonly isPreview: boolean;
   /** Bytes of GPU memory that frames are drawn with. */
   readonly frameBytes: number;
+  /** See `Painter.pixelShare`. */
+  readonly pixelShare?: number | undefined;
   /** Pixels by which pictures at rest may be off. */
   readonly pixels: number | undefined;
   readonly parts: readonly PartStats[];
@@ -88,7 +90,7 @@ export interface StatsContext {
 /** Puts together what is known without asking the GPU. */
 export function statsOf(
   scenes: readonly LoadedGaussians[],
-  { quality, dynamicQuality, counts, isPreview, frameBytes, pixels = 0, parts }: StatsContext,
+  { quality, dynamicQuality, counts, isPreview, frameBytes, pixelShare = 1, pixels = 0, parts }: StatsContext,
 ): SceneStats {
   const sum = (of: (scene: LoadedGaussians) => number | undefined): number =>
     scenes.reduce((total, scene) => total + (of(scene) ?? 0), 0);
@@ -122,10 +124,16 @@ export function statsOf(
       ...whyDropped(dropped),
       ...whyDetail(quality, detail),
       ...whyPace(quality, dynamicQuality),
+      ...whyFewPixels(pixelShare),
       ...whyLeft(counts?.left ?? 0),
       ...faultsOf(scenes[0].place.context),
     ],
   };
+}
+
+function whyFewPixels(share: number): string[] {
+  if (share === 1) return [];
+  return [`Its splats cover the view too often: each side has ${(100 * share).toPrecision(2)} % of its pixels.`];
 }
 
 function whyPreview(isPreview: boolean): string[] {

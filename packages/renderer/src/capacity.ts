@@ -1,6 +1,8 @@
 import type { Capacity, CapacityMemory, LookedAt } from './capacity-memory.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { copyCounts } from './copy-counts.js';
+import { constants } from './generated/shaders.js';
+import type { Scratch } from './scratch.js';
 
 /** Between which bounds the room stays; the lower one may change, and is asked for at every look. */
 export interface CapacityBounds {
@@ -34,12 +36,21 @@ const PAIRS_PER_SPLAT = 1.5;
 /** Pairs for each splat of the budget, where a scene with levels of detail keeps to one: a fifth of them is never visible, and those that use it up are small. 0.93 were needed of 10 and of 16 million. */
 const PAIRS_PER_BUDGETED = 1.1;
 
+/** Visible splats, those without room, the same of pairs, and how often the frame is covered. */
+const COUNT_BYTES = 20;
+
 /** Room to begin with. */
 export function initialCapacity(splats: number, most: Capacity, isBudgeted = false): Capacity {
   const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
   const usual = Math.ceil((isBudgeted ? PAIRS_PER_BUDGETED : PAIRS_PER_SPLAT) * visible);
   const pairs = Math.max(LEAST_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), usual);
   return { visible, pairs: Math.min(most.pairs, pairs) };
+}
+
+/** What a frame had. */
+export interface FrameCounts extends Capacity {
+  /** `gathered[COVERED]` */
+  readonly covered: number;
 }
 
 /** Buffers that counts are read from: one for the monitor at hand and one for the next, so that none is made when scenes come and go. */
@@ -69,7 +80,7 @@ export class CountBuffers {
 
   #make(): GPUBuffer {
     const { mapRead, copyDestination } = BUFFER_USAGE;
-    return this.#device.createBuffer({ label: 'gs.capacity', size: 16, usage: mapRead | copyDestination });
+    return this.#device.createBuffer({ label: 'gs.capacity', size: COUNT_BYTES, usage: mapRead | copyDestination });
   }
 }
 
@@ -116,12 +127,12 @@ export class CapacityMonitor {
 
   /**
    * Counts a frame.
-   * @param hasPairs whether its rasterizer makes pairs of splat and bin
+   * @param isOpen whether its counts matter however much room for splats there is: its rasterizer makes pairs of splat and bin, or its overdraw is limited
    * @param picture which it is: one of another size needs another room, and at rest no other follows
    * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
    */
-  isDue(hasPairs: boolean, picture: LookedAt): boolean {
-    const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !hasPairs;
+  isDue(isOpen: boolean, picture: LookedAt): boolean {
+    const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !isOpen;
     this.#drawn = picture;
     this.#frame++;
     const isInTurn =
@@ -135,8 +146,9 @@ export class CapacityMonitor {
   }
 
   /** Records the copy of the counts. */
-  record(encoder: GPUCommandEncoder, plan: GPUBuffer, pairPlan: GPUBuffer | undefined): void {
+  record(encoder: GPUCommandEncoder, { plan, gathered }: Pick<Scratch, 'plan' | 'gathered'>, pairPlan: GPUBuffer | undefined): void {
     copyCounts(encoder, plan, pairPlan, this.#staging, 0);
+    encoder.copyBufferToBuffer(gathered, 4 * constants.COVERED, this.#staging, COUNT_BYTES - 4, 4);
     this.#isReading = true;
   }
 
@@ -144,10 +156,10 @@ export class CapacityMonitor {
    * Looks at the counts once they are there.
    * @returns what the frame had: undefined where the device is lost, or this monitor was destroyed meanwhile
    */
-  read(): Promise<Capacity | undefined> {
+  read(): Promise<FrameCounts | undefined> {
     return this.#staging.mapAsync(0x1).then(
       () => {
-        const [visible, hidden, pairs, lostPairs] = new Uint32Array(this.#staging.getMappedRange().slice(0));
+        const [visible, hidden, pairs, lostPairs, covered] = new Uint32Array(this.#staging.getMappedRange().slice(0));
         this.#staging.unmap();
         this.#isReading = false;
         if (this.#isDestroyed) {
@@ -156,7 +168,7 @@ export class CapacityMonitor {
         }
         const used = { visible: visible + hidden, pairs: pairs + lostPairs };
         this.judge(used, hidden + lostPairs > 0, this.#picture);
-        return { visible, pairs };
+        return { visible, pairs, covered };
       },
       () => undefined,
     );

@@ -125,12 +125,14 @@ export class PageTable {
    * Points every page at a camera, for the commands that are submitted next.
    * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
    * @param filter in place of those of the scenes
+   * @param mostCovered `View.most_covered`; undefined for no limit
    */
   look(
     camera: Camera,
     pixelArea: number,
     { shDegree, depthKeyBits, detail, detailFade, splatBudget }: RenderSettings,
     filter?: SplatFilter,
+    mostCovered?: number,
   ): void {
     const shared = {
       sh_cap: shDegree,
@@ -138,6 +140,7 @@ export class PageTable {
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
+      ...(mostCovered !== undefined && { most_covered: mostCovered }),
     };
     let page = 0;
     for (const { scene, sceneToWorld, opacity, crop = EVERYWHERE } of this.#placements) {

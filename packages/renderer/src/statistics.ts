@@ -15,6 +15,8 @@ export interface FrameStatistics {
   readonly unusable: number;
   /** Pixels by which what is drawn may be displaced so that the frame keeps its `splatBudget`; 0 without one, or with room for all. */
   readonly budgetError: number;
+  /** How often the visible splats cover the frame: the sum of the shares of its pixels that they take. */
+  readonly covered: number;
 }
 
 /** The buffers that hold the counts. */
@@ -38,6 +40,7 @@ export async function readStatistics(device: GPUDevice, counters: Counters): Pro
     [counters.pairPlan, overflow.offset],
     [counters.gathered, 4 * constants.UNUSABLE],
     [counters.chunkShares, counters.chunkShares.size - 4],
+    [counters.gathered, 4 * constants.COVERED],
   ];
   const staging = device.createBuffer({
     label: 'gs.statistics',
@@ -58,5 +61,6 @@ export async function readStatistics(device: GPUDevice, counters: Counters): Pro
     pairOverflow: words[3],
     unusable: words[4],
     budgetError,
+    covered: words[6] / constants.COVERED_UNIT,
   };
 }

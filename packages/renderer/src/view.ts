@@ -8,6 +8,9 @@ const CLAMP_MARGIN = 0.3;
 /** WGSL lets compilers assume that there is no infinity: a far plane at infinity is as far as float32 goes. */
 export const MAX_FLOAT32 = 3.4028234663852886e38;
 
+/** Splats may cover the image as often as they do. */
+const NO_LIMIT = 0xffffffff;
+
 type ViewValues = StructValues<typeof layouts.View>;
 
 /** The fields of the WGSL `View` that depend on the camera and on the origin of the Gaussians. */
@@ -45,6 +48,7 @@ export function cameraValues(camera: Camera, origin: Vector3, variance: number =
   const marginY = (CLAMP_MARGIN * 0.5 * height) / fy;
   const eye = subtract(eyeOf(worldToCamera), origin);
   return {
+    most_covered: NO_LIMIT,
     local_to_camera: columns,
     eye,
     eye_rest: subtract(eye, [Math.fround(eye[0]), Math.fround(eye[1]), Math.fround(eye[2])]),

@@ -6,13 +6,14 @@ import type { Scratch } from './scratch.js';
 import { recordProjection } from './frame.js';
 import { FrameResources, type Resources } from './frame-resources.js';
 import type { PageRequests } from './gaussian-scene.js';
-import { layouts } from './generated/shaders.js';
+import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { orderOn } from './lazy-order.js';
 import { completed, type RenderSettings } from './render-settings.js';
 import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
+import { OverdrawLimit } from './overdraw.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
 import type {
@@ -26,6 +27,7 @@ import { TilesRasterizer } from './rasterizers/tiles.js';
 import { requireBlendable, requireTextureSize } from './requirements.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
+import type { FrameCounts } from './capacity.js';
 import { copyCounts } from './copy-counts.js';
 import type { FrameStatistics } from './statistics.js';
 import { settle, variantsOf, type Variants } from './variants.js';
@@ -56,6 +58,11 @@ export interface ViewpointOptions {
    * Called when a frame that was drawn lacked splats for want of room in the viewpoint's buffers. The next frame has the room: draw it.
    */
   readonly onIncomplete?: () => void;
+  /**
+   * Whether frames whose splats cover them more than a thousand times, and once more for each 500 splats, are drawn with fewer pixels. Their largest splats are missing until the sum is
+   * known: see `onIncomplete`. Default: false.
+   */
+  readonly limitsOverdraw?: boolean;
 }
 
 /** One of several views: see {@link UncheckedViewpoint.drawAll}. */
@@ -101,6 +108,7 @@ export class UncheckedViewpoint {
   readonly #compose: ComposeStage;
   readonly #pacer: SubmissionPacer;
   readonly #onIncomplete: () => void;
+  readonly #overdraw: OverdrawLimit | undefined;
   readonly #memory: GpuMemory;
   readonly #composeUniform: GPUBuffer;
   readonly #composeBytes = new ArrayBuffer(layouts.Compose.size);
@@ -118,12 +126,13 @@ export class UncheckedViewpoint {
   #last: (ProbeSource & { readonly scale: number }) | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if settings need a feature that the device lacks. */
-  constructor(device: GPUDevice, world: World, { settings = {}, onIncomplete }: ViewpointOptions = {}) {
+  constructor(device: GPUDevice, world: World, { settings = {}, onIncomplete, limitsOverdraw = false }: ViewpointOptions = {}) {
     this.#device = device;
     this.world = world;
     this.#variants = variantsOf(device);
     this.#settings = settings;
     this.#onIncomplete = onIncomplete ?? (() => undefined);
+    this.#overdraw = limitsOverdraw ? new OverdrawLimit() : undefined;
     this.#compose = new ComposeStage(device);
     this.#pacer = new SubmissionPacer(device);
     this.#memory = new GpuMemory(device);
@@ -154,6 +163,11 @@ export class UncheckedViewpoint {
   /** Name of the rasterizer in use. */
   get rasterizer(): RasterizerName {
     return this.#engine.rasterizer.name;
+  }
+
+  /** Share of the pixels of each side that frames are drawn with because splats cover them too often, 0..1. */
+  get pixelShare(): number {
+    return this.#overdraw?.share ?? 1;
   }
 
   /** Bytes of GPU memory held between frames, scenes not counted. */
@@ -199,7 +213,7 @@ export class UncheckedViewpoint {
     if (isWatched) this.#watch(last, resources);
     this.#submit(last, submissions);
     timer?.submitted?.();
-    const counts = isWatched ? resources.monitor.read() : undefined;
+    const counts = isWatched ? this.#read(resources) : undefined;
     if (counts && submissions.watch) {
       void this.#pacer.learn(
         submissions.watch,
@@ -254,14 +268,14 @@ export class UncheckedViewpoint {
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
     const levers = depth && !order ? { ...asked, depthKeyBits: 32 as const } : asked;
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
-    const drawn = scaled(camera, levers.resolutionScale);
+    const drawn = scaled(camera, levers.resolutionScale * this.pixelShare);
     depth?.prepare(camera, drawn, rasterizer.name, auxiliary);
     const resources = all.fit(this.world, levers.splatBudget);
     const { table, scratch, bindings, monitor } = resources;
     table.update();
     timer?.startFrame();
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, levers, picture.filter);
+    table.look(drawn, pixelArea, levers, picture.filter, this.#overdraw?.mostFor(table.splats));
     const wishes = recordProjection(encoder, {
       stages,
       bindings,
@@ -275,7 +289,7 @@ export class UncheckedViewpoint {
       keepsDepths: depth !== undefined && !order,
       timer,
     });
-    const isWatched = monitor.isDue(rasterizer.pairPlan !== undefined, {
+    const isWatched = monitor.isDue(rasterizer.pairPlan !== undefined || this.#overdraw?.mayExceed(table.splats) === true, {
       pixels: drawn.width * drawn.height,
       wholePixels: camera.width * camera.height,
       isWhole: isWhole(levers, this.resolvedSettings),
@@ -288,7 +302,14 @@ export class UncheckedViewpoint {
   }
 
   #watch(encoder: GPUCommandEncoder, { monitor, scratch }: Resources): void {
-    monitor.record(encoder, scratch.plan, this.#engine.rasterizer.pairPlan);
+    monitor.record(encoder, scratch, this.#engine.rasterizer.pairPlan);
+  }
+
+  /** Reads the counts of a frame, and judges them. */
+  async #read({ monitor, table }: Resources): Promise<FrameCounts | undefined> {
+    const counts = await monitor.read();
+    if (counts && this.#overdraw?.note(counts.covered / constants.COVERED_UNIT, table.splats)) this.#onIncomplete();
+    return counts;
   }
 
   /** Reads what a frame left that a host has submitted. */
@@ -298,7 +319,7 @@ export class UncheckedViewpoint {
     for (const wish of wishes) wish.copy(encoder);
     if (isWatched) this.#watch(encoder, resources);
     this.#device.queue.submit([encoder.finish()]);
-    if (isWatched) void resources.monitor.read();
+    if (isWatched) void this.#read(resources);
     for (const wish of wishes) wish.read();
   }
 
@@ -307,7 +328,7 @@ export class UncheckedViewpoint {
     const { readStatistics } = await loadModule('the code for counts', () => import('./statistics.js'));
     const resources = this.#engine.resources.current;
     if (resources === undefined)
-      return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
+      return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0, covered: 0 };
     const { plan, gathered, chunkShares } = resources.scratch;
     return readStatistics(this.#device, { plan, gathered, chunkShares, pairPlan: this.#engine.rasterizer.pairPlan });
   }
@@ -331,8 +352,10 @@ export class UncheckedViewpoint {
       await orderOn(this.#device).load();
       return false;
     }
-    const { visible, overflow, pairs, pairOverflow } = await this.statistics();
-    return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow));
+    const { visible, overflow, pairs, pairOverflow, covered } = await this.statistics();
+    const hadRoom = this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow));
+    const { splats } = this.#engine.resources.current!.table;
+    return this.#overdraw?.note(covered, splats) !== true && hadRoom;
   }
 
   /**

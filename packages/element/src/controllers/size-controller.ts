@@ -33,12 +33,11 @@ export class SizeController implements ReactiveController {
    * Size to draw at; null while there is no pixel to draw, or the size is not known yet.
    * @param maxPixelRatio most drawn pixels for one CSS pixel.
    * @param maxSide longest side that the device's textures may have, in pixels.
-   * @param share of the pixels of each side, 0..1
    */
-  pixelSize(maxPixelRatio: number, maxSide: number, share: number): PixelSize | null {
+  pixelSize(maxPixelRatio: number, maxSide: number): PixelSize | null {
     const { width, height } = this.#deviceSize ?? { width: 0, height: 0 };
     if (width === 0 || height === 0) return null;
-    const shrink = share * Math.min(1, maxPixelRatio / this.#pixelRatio, maxSide / Math.max(width, height));
+    const shrink = Math.min(1, maxPixelRatio / this.#pixelRatio, maxSide / Math.max(width, height));
     return { width: Math.max(1, Math.round(width * shrink)), height: Math.max(1, Math.round(height * shrink)) };
   }
 

@@ -209,9 +209,8 @@ export class ViewController implements FrameClient {
 
   /** null where there is no size. */
   #pixelsOf({ place }: Painter): PixelSize | null {
-    const { size, attributes, shown } = this.#host;
-    const share = Math.min(1, ...shown.map(({ pixelShare }) => pixelShare));
-    return size.pixelSize(attributes.maxPixelRatio, place.limits.maxTextureDimension2D, share);
+    const { size, attributes } = this.#host;
+    return size.pixelSize(attributes.maxPixelRatio, place.limits.maxTextureDimension2D);
   }
 
   #render(painter: Painter, request: CanvasFrame, now: number, cameraMoved: boolean): void {

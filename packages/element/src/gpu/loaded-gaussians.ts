@@ -43,8 +43,6 @@ export class LoadedGaussians implements Drawable {
   readonly live: Timeline | undefined;
   /** Submissions that the painting of a frame is divided into. */
   readonly submissions: number;
-  /** Share of the pixels of each side that its frames are drawn with. */
-  pixelShare = 1;
   /** Its triangles, once they are read. */
   model: MeshModel | undefined;
   /** What its splats are ordered by, where its file tells. */

@@ -38,6 +38,15 @@ export const noAdapter = (): GaussianSplatError =>
     remedy: 'switch on hardware acceleration in the browser settings, or update the graphics driver',
   });
 
+/** Prototype.js 1.7 has an `Array.from` of its own. */
+export const changedPage = (): GaussianSplatError =>
+  new GaussianSplatError('unsupported/page', {
+    where: 'this page',
+    expected: 'the Array.from of the browser',
+    found: 'another, which a script of the page has put in its place',
+    remedy: 'load a version of that script that leaves Array.from alone, or show the scene in an iframe',
+  });
+
 export const noLimits = (error: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/limits', {
     where: 'the graphics adapter',

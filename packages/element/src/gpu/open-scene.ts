@@ -7,7 +7,7 @@ import { chooseAtRest } from './choose-at-rest.js';
 import { LoadedGaussians } from './loaded-gaussians.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
 import { PreviewUploads } from './preview-uploads.js';
-import { assertWebGpu } from './request-device.js';
+import { assertWebGpu, why } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 import { byteLengthOf, upload } from './upload.js';
 import { canvasFormat } from './viewport.js';
@@ -36,6 +36,7 @@ export interface OpenOptions {
 /** Opens what is asked for, with WebGL where there is no WebGPU and the request lets it. Rejects with GaussianSplatError or the signal's reason. */
 export async function openScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   const { open = openGaussians } = options;
+  if (!Array.from({ length: 1 }, () => 1)[0]) throw await why(({ changedPage }) => changedPage());
   let reason: unknown;
   if (request.renderer !== 'webgl')
     try {

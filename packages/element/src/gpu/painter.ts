@@ -104,6 +104,8 @@ export interface Painter {
   readonly device: GPUDevice;
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
   readonly byteLength: number;
+  /** Share of the pixels of each side that frames are drawn with because splats cover them too often, 0..1. */
+  readonly pixelShare: number;
   readonly isDestroyed: boolean;
   readonly isLost: boolean;
   /** True if there is what frames with other settings need. */

@@ -14,14 +14,12 @@ export interface SceneUploadOptions {
 /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
 export async function upload(
   lease: DeviceLease,
-  { packed, bounds, pixelShare = 1, warnings, order, hasMeshes }: LoadedScene,
+  { packed, bounds, warnings, order, hasMeshes }: LoadedScene,
   { signal, memoryBudget, submissions }: SceneUploadOptions,
 ): Promise<LoadedGaussians> {
   const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
   if (!signal.aborted)
-    return Object.assign(new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes }), {
-      pixelShare,
-    });
+    return new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes });
   gaussians.destroy();
   throw signal.reason;
 }

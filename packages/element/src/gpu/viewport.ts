@@ -47,6 +47,7 @@ export class Viewport implements Painter {
     this.#events = events;
     this.viewpoint = new UncheckedViewpoint(device, contents.world, {
       settings: this.#settings(),
+      limitsOverdraw: true,
       onIncomplete: () => {
         this.#drawnSize = '';
         this.#filter?.invalidate();
@@ -58,6 +59,10 @@ export class Viewport implements Painter {
 
   get byteLength(): number {
     return this.viewpoint.byteLength + (this.#filter?.byteLength ?? 0);
+  }
+
+  get pixelShare(): number {
+    return this.viewpoint.pixelShare;
   }
 
   get isDestroyed(): boolean {

@@ -10,7 +10,6 @@ import {
   type LoadLimits,
 } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
-import { limitOverdraw } from './coverage.js';
 import { fileName, named, throttled } from './load-helpers.js';
 import type { LargePly } from './large-ply.js';
 import type * as sequences from './sequence-of.js';
@@ -61,7 +60,7 @@ export async function loadScene(
     const pack = (cloud: GaussianCloud, bounds = boundsOf(cloud)): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: { ...bounds, up: cloud.hints?.up },
-      ...limitOverdraw(cloud, bounds),
+      warnings: cloud.warnings,
       order: cloud.hints?.order,
       hasMeshes: cloud.hints?.meshes,
     });
@@ -107,8 +106,7 @@ export async function loadScene(
     onReading?.(true);
     if (cloud.levelRuns === undefined) return pack(cloud);
     const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
-    const overdraw = limitOverdraw(cloud, boundsOf(cloud));
-    return { ...packLevels(cloud, request.sh), ...overdraw };
+    return packLevels(cloud, request.sh);
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(request.url));

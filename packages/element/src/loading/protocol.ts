@@ -63,8 +63,6 @@ export interface LoadedScene {
   readonly bounds: SceneBounds;
   /** What of the file is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
-  /** Share of the pixels of each side that frames are drawn with, 0..1; absent for all: see `limitOverdraw`. */
-  readonly pixelShare?: number;
   /** What splats are ordered by, where the file tells: see `CloudHints.order`. */
   readonly order?: 'pixel' | undefined;
   /** The file has triangles, too. */
@@ -150,7 +148,7 @@ export type PageMessage =
   /** Pack what comes through the port. */
   | { readonly type: 'pack'; readonly port: MessagePort }
   /** Sort splats, at these positions, for the views that come through the port. */
-  | { readonly type: 'sort'; readonly port: MessagePort; readonly positions: Float32Array }
+  | { readonly type: 'sort'; readonly port: MessagePort; readonly positions: Float32Array; readonly areas: Float32Array }
   /** Run a generator once on the CPU, in a worker that is started for it. */
   | CpuRunMessage;
 

@@ -202,7 +202,7 @@ function serve(scope: WorkerScope): void {
     else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
     else if (data.type === 'pack') serveWith(import('./pack-shares.js'), ({ packShares }) => packShares(data.port));
     else if (data.type === 'sort')
-      serveWith(import('./sort-splats.js'), ({ sortSplats }) => sortSplats(data.port, data.positions));
+      serveWith(import('./sort-splats.js'), ({ sortSplats }) => sortSplats(data.port, data.positions, data.areas));
     else if (data.type === 'run-on-cpu')
       serveWith(import('@gaussian-splat/generator'), ({ answerCpuRun }) => answerCpuRun(data));
     else void run(data.id, data);

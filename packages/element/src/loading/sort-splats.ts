@@ -9,17 +9,20 @@ export interface SortRequest {
 
 export interface SortAnswer extends SortRequest {
   readonly count: number;
+  /** How often the splats cover the image. */
+  readonly covered: number;
   /** What sorting took, ms. */
   readonly milliseconds: number;
 }
 
-/** Answers what comes through a port. @param positions [N, 3] */
-export function sortSplats(port: MessagePort, positions: Float32Array): void {
-  const splats = new SplatOrder(positions);
+/** Answers what comes through a port. @param positions [N, 3] @param areas [N] */
+export function sortSplats(port: MessagePort, positions: Float32Array, areas: Float32Array): void {
+  const splats = new SplatOrder(positions, areas);
   port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {
     const begin = performance.now();
     const count = splats.sort(view, order);
-    const answer: SortAnswer = { view, order, count, milliseconds: performance.now() - begin };
+    const { covered } = splats;
+    const answer: SortAnswer = { view, order, count, covered, milliseconds: performance.now() - begin };
     port.postMessage(answer, [order.buffer]);
   };
 }

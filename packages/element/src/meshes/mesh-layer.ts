@@ -78,6 +78,23 @@ export class MeshLayer {
     return new MeshLayer(device, renderer);
   }
 
+  /** Compiles what a model is drawn with, a few milliseconds of the page's thread at a time, and on the GPU without holding up other work. */
+  async compile(model: Model): Promise<void> {
+    this.#show(model);
+    for (const [kind, target] of [
+      [OPAQUE, this.#target],
+      [TRANSPARENT, this.#glass],
+    ] as const) {
+      this.#camera.layers.set(kind);
+      this.#renderer.setRenderTarget(target);
+      // The list of what to compile is made before the first await: nothing of it is out of sight.
+      const culled = model.setCulling(false);
+      const compiled = this.#renderer.compileAsync(this.#scene, this.#camera);
+      model.setCulling(culled);
+      await compiled;
+    }
+  }
+
   draw({ camera }: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<FrameTarget> {
     this.#arrange(models, world);
     this.#look(camera, world);

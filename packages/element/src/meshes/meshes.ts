@@ -10,6 +10,7 @@ import type { SourceEntry } from '../source-entry.js';
 import type { Member } from '../member.js';
 import type { ViewerFrame } from '../camera/orbit.js';
 import { MeshLayer } from './mesh-layer.js';
+import type { Model } from './model.js';
 import { fetchMesh, openModel } from './open-mesh.js';
 
 /** A mesh where it is drawn. */
@@ -56,13 +57,15 @@ export class Meshes {
     return this.#models.map(({ model }) => model.version).join();
   }
 
-  /** Makes the layer of a device, once. */
-  prepare({ device }: LoadedGaussians): Promise<void> {
+  /** Makes the layer of a device, once, and compiles what a model is drawn with. */
+  prepare({ device, model }: Pick<LoadedGaussians, 'device' | 'model'>): Promise<void> {
     const prepare = async (): Promise<void> => {
-      if (this.#layer?.device === device) return;
-      this.#layer?.destroy();
-      this.#layer = undefined;
-      this.#layer = await MeshLayer.create(device);
+      if (this.#layer?.device !== device) {
+        this.#layer?.destroy();
+        this.#layer = undefined;
+        this.#layer = await MeshLayer.create(device);
+      }
+      if (model) await this.#layer.compile(model as Model);
     };
     const prepared = this.#preparing.then(prepare);
     this.#preparing = prepared.catch(() => undefined);
@@ -79,7 +82,7 @@ export class Meshes {
     const mesh = await fetchMesh(services.sceneLoader, limited(request, { memoryBudget }), signal);
     for (const warning of mesh.warnings) this.#stage.warn(`<gaussian-splat>: ${warning}`);
     const model = await openModel(mesh, url, { device: scene.device, signal, memoryBudget });
-    await this.prepare(scene);
+    await this.prepare({ device: scene.device, model });
     if (signal.aborted) model.dispose();
     signal.throwIfAborted();
     scene.model = model;

@@ -58,7 +58,7 @@ export class Model {
     this.#mixer = new AnimationMixer(root);
     for (const clip of animations) this.#mixer.clipAction(clip).play();
     // What bones move may be anywhere.
-    for (const mesh of meshes) mesh.frustumCulled = false;
+    this.setCulling(false);
     this.setTime(0);
   }
 
@@ -86,6 +86,13 @@ export class Model {
     if (this.#mixer === undefined) return;
     this.#mixer.setTime(Math.min(Math.max(0, seconds), this.duration - BEFORE_END));
     this.version++;
+  }
+
+  /** Whether meshes that the camera does not see are left out. @returns whether they were */
+  setCulling(isOn: boolean): boolean {
+    const wasOn = this.#meshes.some(({ frustumCulled }) => frustumCulled);
+    for (const mesh of this.#meshes) mesh.frustumCulled = isOn;
+    return wasOn;
   }
 
   /** Calls back with each mesh and its materials. */

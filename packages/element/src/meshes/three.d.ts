@@ -132,7 +132,7 @@ export class WebGPURenderer {
   setClearColor(color: number, alpha: number): void;
   autoClearDepth: boolean;
   render(scene: Scene, camera: Camera): void;
-  compileAsync(root: Object3D, camera: Camera, scene: Scene): Promise<unknown>;
+  compileAsync(scene: Scene, camera: Camera): Promise<unknown>;
   dispose(): unknown;
   onDeviceLost: (info: unknown) => void;
   onError: (info: { readonly originalEvent?: Event }) => void;

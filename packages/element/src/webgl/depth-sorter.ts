@@ -59,11 +59,15 @@ export interface SortedSplats extends Asked {
   /** Numbers of splats from near to far, in whole rows of `DATA_WIDTH`. */
   readonly order: Uint32Array;
   readonly count: number;
+  /** How often the splats cover the image. */
+  readonly covered: number;
 }
 
 export interface DepthSorterOptions {
   /** [N, 3] relative to the scene's origin */
   readonly positions: Float32Array;
+  /** Of their largest sections; [N] */
+  readonly areas: Float32Array;
   readonly spawn: () => Worker;
   /** Gets each order as it comes; its buffer is only lent. */
   readonly onOrder: (sorted: SortedSplats) => void;
@@ -104,10 +108,12 @@ export class DepthSorter {
 
   /** The order of a view, at once. */
   sortNow(view: OrderView): SortedSplats {
-    this.#here ??= new SplatOrder(this.#options.positions);
+    const here = (this.#here ??= new SplatOrder(this.#options.positions, this.#options.areas));
     // Its own buffer may be away.
     const order = this.#buffer.length > 0 ? this.#buffer : this.#makeBuffer();
-    return { view, askedAt: performance.now(), order, count: this.#here.sort(view, order) };
+    const askedAt = performance.now();
+    const count = here.sort(view, order);
+    return { view, askedAt, order, count, covered: here.covered };
   }
 
   destroy(): void {
@@ -127,8 +133,8 @@ export class DepthSorter {
   #connect(worker: Worker): void {
     if (this.#isOver || this.#isHere) return;
     const { port1, port2 } = new MessageChannel();
-    const { positions } = this.#options;
-    worker.postMessage({ type: 'sort', port: port2, positions } satisfies PageMessage, [port2]);
+    const { positions, areas } = this.#options;
+    worker.postMessage({ type: 'sort', port: port2, positions, areas } satisfies PageMessage, [port2]);
     port1.onmessage = ({ data }: MessageEvent<SortAnswer>) => this.#take(data);
     this.#port = port1;
     this.#proceed();
@@ -147,14 +153,14 @@ export class DepthSorter {
     this.#port.postMessage({ view: next.view, order } satisfies SortRequest, [order.buffer]);
   }
 
-  #take({ view, order, count, milliseconds }: SortAnswer): void {
+  #take({ view, order, count, covered, milliseconds }: SortAnswer): void {
     if (this.#isHere || this.#isOver) return;
     this.milliseconds = milliseconds;
     clearTimeout(this.#late);
     const { askedAt = 0 } = this.#sorting ?? {};
     this.#sorting = undefined;
     this.#buffer = order;
-    this.#options.onOrder({ view, askedAt, order, count });
+    this.#options.onOrder({ view, askedAt, order, count, covered });
     this.#proceed();
   }
 

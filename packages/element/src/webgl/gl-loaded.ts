@@ -1,4 +1,4 @@
-import { glBytes, GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
+import { areasIn, glBytes, GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
 import { LoadedGaussians, type OwnedGaussians } from '../gpu/loaded-gaussians.js';
 import { limit } from '../gpu/memory-budget.js';
 import type { Contents, Painter, PainterEvents } from '../gpu/painter.js';
@@ -19,21 +19,23 @@ export class GlLoaded extends LoadedGaussians {
   readonly frames: GlRenderer;
   /** [N, 3] relative to the scene's origin */
   readonly positions: Float32Array;
+  /** Of their largest sections; [N] */
+  readonly areas: Float32Array;
   readonly spawn: () => Worker;
 
   private constructor(
     lease: GlLease,
     frames: GlRenderer,
     gaussians: OwnedGaussians,
-    { packed, bounds, pixelShare = 1, warnings = [], hasMeshes = false }: LoadedScene,
+    { packed, bounds, warnings = [], hasMeshes = false }: LoadedScene,
     spawn: () => Worker,
   ) {
     super(lease, gaussians, bounds, 1, { warnings: hasMeshes ? [...warnings, NO_MESHES] : warnings });
-    this.pixelShare = pixelShare;
     this.lease = lease;
     this.frames = frames;
     this.spawn = spawn;
     this.positions = positionsIn(packed.geometry);
+    this.areas = areasIn(packed.geometry);
   }
 
   /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */

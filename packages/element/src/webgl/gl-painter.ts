@@ -1,5 +1,5 @@
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
-import { isSameView, orderView, drawn as whenDrawn, type OrderView } from '@gaussian-splat/renderer/webgl';
+import { isSameView, orderView, OverdrawLimit, drawn as whenDrawn, type OrderView } from '@gaussian-splat/renderer/webgl';
 import type { CanvasFrame, Painter, PainterEvents, Place, ReadCounts, Rendering, Surface } from '../gpu/painter.js';
 import { DepthSorter, type SortedSplats } from './depth-sorter.js';
 import type { GlLoaded } from './gl-loaded.js';
@@ -21,6 +21,7 @@ export class GlPainter implements Painter {
   readonly isPrepared = true;
   readonly #scene: GlLoaded;
   readonly #sorter: DepthSorter;
+  readonly #overdraw = new OverdrawLimit();
   /** The view that the order on the GPU is of. */
   #sorted: OrderView | undefined;
   /** When it was asked for, by the page's clock. */
@@ -44,10 +45,9 @@ export class GlPainter implements Painter {
     let tellOrdered: () => void;
     this.#ordered = new Promise((resolve) => (tellOrdered = resolve));
     this.#shown = new Promise((resolve) => (this.#tellShown = resolve));
-    const { positions, spawn } = scene;
+    const { positions, areas, spawn } = scene;
     this.#sorter = new DepthSorter({
-      positions,
-      spawn,
+      ...{ positions, areas, spawn },
       onOrder: (sorted) => {
         // Who waits for the first order draws it.
         const isDue = this.#isOwed || this.#sorted !== undefined;
@@ -68,6 +68,10 @@ export class GlPainter implements Painter {
   }
 
   async finished(): Promise<void> {}
+
+  get pixelShare(): number {
+    return this.#overdraw.share;
+  }
 
   get byteLength(): number {
     return this.#scene.frames.byteLength;
@@ -165,11 +169,12 @@ export class GlPainter implements Painter {
     this.#sorter.request(view);
   }
 
-  #setOrder({ view, order, count, askedAt }: SortedSplats): void {
+  #setOrder({ view, order, count, covered, askedAt }: SortedSplats): void {
     // What was sorted at once meanwhile is newer.
     if (this.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
     this.#sorted = view;
     this.#sortedAt = askedAt;
+    this.#overdraw.note(covered, this.#scene.gaussians.count);
     this.#scene.frames.setOrder(order, count);
   }
 
@@ -183,7 +188,7 @@ export class GlPainter implements Painter {
     this.#scene.frames.render({
       ...{ camera, shDegree, filter },
       accumulation: quality === 'balanced' || quality === 'fast' ? 'rgba16float' : 'rgba32float',
-      resolutionScale: levers?.resolutionScale ?? 1,
+      resolutionScale: this.pixelShare * (levers?.resolutionScale ?? 1),
     });
   }
 

@@ -91,7 +91,8 @@ function throwTruncated(data: ElementData, rows: number): never {
   });
 }
 
-function cursorAt({ source, encoding, start }: ElementData): ValueCursor {
+/** Where the first row begins. */
+export function cursorAt({ source, encoding, start }: ElementData): ValueCursor {
   return encoding === 'ascii'
     ? new AsciiCursor(source, start)
     : new BinaryCursor(source, start, encoding === 'little-endian');
@@ -121,7 +122,8 @@ function readSequentially(data: ElementData, targets: readonly ColumnTarget[]): 
   return cursor.position;
 }
 
-function skipList(
+/** Skips a list. Throws `decode/corrupt` for a length that is none. */
+export function skipList(
   data: ElementData,
   cursor: ValueCursor,
   property: string,

@@ -1,5 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { LoadBudget } from '../budget.js';
+import { isPly } from '../signatures.js';
+import { readPlyMesh } from './ply-mesh.js';
 import { openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument, type OpenUri } from '../gltf/document.js';
 import { Images, type ImageFile } from './images.js';
@@ -7,7 +9,7 @@ import { Survey } from './survey.js';
 import { trimmed } from './trim.js';
 import { Views, type MeshoptView } from './views.js';
 
-/** A glTF file in memory, and the ways to the files that it names. */
+/** A file in memory, and the ways to the files that it names. */
 export interface TriangleSource {
   readonly bytes: Uint8Array;
   /** What error messages call the file. */
@@ -20,7 +22,7 @@ export interface TriangleSource {
   readonly openUri: OpenUri;
 }
 
-/** The triangles, points and lines of a glTF: JSON that names no file, and the bytes that it refers to. */
+/** The triangles, points and lines of a file: JSON that names no file, and the bytes that it refers to. */
 export interface TriangleFile {
   /**
    * glTF 2.0 with one scene, without splats, cameras, names and extras. Its buffer views have neither buffers nor offsets: their bytes are in `views`. Its images have neither
@@ -44,12 +46,14 @@ const KNOWN =
   /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_transform|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_xmp\w*)$/;
 
 /**
- * Reads the triangles of a glTF 2.0 or GLB file. Every number that a viewer allocates by is checked, and all that the file announces or names again is charged to the budget, before
+ * Reads the triangles of a glTF 2.0, GLB or PLY file. Every number that a viewer allocates by is checked, and all that the file announces or names again is charged to the budget, before
  * anything is decoded.
  *
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`, and the errors of `openUri`
  */
-export async function readTriangles({ bytes, name, budget, openUri }: TriangleSource): Promise<TriangleFile> {
+export async function readTriangles(source: TriangleSource): Promise<TriangleFile> {
+  const { bytes, name, budget, openUri } = source;
+  if (isPly(bytes)) return readPlyMesh(source);
   const file = openContainer({ bytes, name, budget }, KNOWN);
   const document = new GltfDocument(file, { name, budget }, { uri: openUri });
   const survey = new Survey(document);

@@ -11,5 +11,7 @@ export {
   type GlQuads,
   type GlQuadsFrame,
 } from './gl-renderer.js';
+export { OverdrawLimit } from '../overdraw.js';
+export { areasIn } from './splat-areas.js';
 export { DATA_WIDTH, SOURCE_DIGEST } from './shaders.js';
 export { distanceView, isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';

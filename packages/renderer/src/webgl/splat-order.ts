@@ -10,12 +10,28 @@ export interface OrderView {
   readonly far: number;
   /** Where set, splats are in order of their distance from here, and all are listed: turning the camera changes nothing. */
   readonly point?: Vector3 | undefined;
+  /** Rows of the camera's matrix that give x and y from the axis on, in halves of the image at depth 1. */
+  readonly across: readonly (readonly [x: number, y: number, z: number, offset: number, center: number])[];
+  /** Share of the image that one unit of area takes at depth 1. */
+  readonly shareOfArea: number;
+  readonly isParallel: boolean;
 }
 
 /** The view of a camera, for positions relative to an origin. */
-export function orderView({ worldToCamera: m, near, far }: Camera, origin: Vector3): OrderView {
+export function orderView(camera: Camera, origin: Vector3): OrderView {
+  const { worldToCamera: m, near, far, width, height, fx, fy, cx, cy, orthographic = false } = camera;
   const axis: Vector3 = [m[8], m[9], m[10]];
-  return { axis, offset: axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2] + m[11], near, far };
+  const offsetOf = (row: number): number =>
+    m[row] * origin[0] + m[row + 1] * origin[1] + m[row + 2] * origin[2] + m[row + 3];
+  const acrossOf = (row: number, focal: number, center: number, size: number): OrderView['across'][number] => {
+    const scale = (2 * focal) / size;
+    return [scale * m[row], scale * m[row + 1], scale * m[row + 2], scale * offsetOf(row), (2 * center) / size - 1];
+  };
+  return {
+    ...{ axis, offset: offsetOf(8), near, far, isParallel: orthographic },
+    across: [acrossOf(0, fx, cx, width), acrossOf(4, fy, cy, height)],
+    shareOfArea: (fx * fy) / (width * height),
+  };
 }
 
 /** The view of a camera in whose order splats lie by their distance from a point, by default from its eye. */
@@ -31,6 +47,9 @@ export const isSameView = (a: OrderView, b: OrderView): boolean =>
 const isSamePlace = (a: Vector3 | undefined, b: Vector3 | undefined): boolean =>
   a !== undefined && b !== undefined && a.every((value, i) => value === b[i]);
 
+/** Shares of the image below this count without a look whether the image has them. */
+const SMALL_SHARE = 1 / 64;
+
 /** Values of a digit: half of a float32. */
 const DIGITS = 1 << 16;
 
@@ -38,15 +57,22 @@ const DIGITS = 1 << 16;
  * A stable radix sort by the float32 depth, exactly: the bits of a positive float32 grow as it does. Two passes of 16 bits.
  */
 export class SplatOrder {
+  /** How often the splats of the last order cover the image, by their areas. */
+  covered = 0;
   readonly #positions: Float32Array;
+  readonly #areas: Float32Array | undefined;
   readonly #keys: Uint32Array;
   readonly #listed: Uint32Array;
   readonly #halfSorted: Uint32Array;
   readonly #low = new Uint32Array(DIGITS);
   readonly #high = new Uint32Array(DIGITS);
 
-  /** @param positions [N, 3] */
-  constructor(positions: Float32Array) {
+  /**
+   * @param positions [N, 3]
+   * @param areas of their largest sections, in squared units of the positions; [N]. Without them nothing is covered
+   */
+  constructor(positions: Float32Array, areas?: Float32Array) {
+    this.#areas = areas;
     const count = positions.length / 3;
     this.#positions = positions;
     this.#keys = new Uint32Array(count);
@@ -61,6 +87,7 @@ export class SplatOrder {
    */
   sort(view: OrderView, target: Uint32Array): number {
     const count = view.point ? this.#findDistances(view.point) : this.#findKeys(view);
+    this.covered = this.#areas && !view.point ? this.#sumShares(view, count, this.#areas) : 0;
     const [keys, listed, halfSorted] = [this.#keys, this.#listed, this.#halfSorted];
     startPlaces(this.#low);
     startPlaces(this.#high);
@@ -73,6 +100,27 @@ export class SplatOrder {
       target[this.#high[keys[i] >>> 16]++] = i;
     }
     return count;
+  }
+
+  /** How often the listed splats cover the image. */
+  #sumShares({ across, shareOfArea, isParallel }: OrderView, count: number, areas: Float32Array): number {
+    const positions = this.#positions;
+    const depths = new Float32Array(this.#keys.buffer);
+    let sum = 0;
+    for (let k = 0; k < count; k++) {
+      const i = this.#listed[k];
+      const depth = isParallel ? 1 : depths[i];
+      const share = (shareOfArea * areas[i]) / (depth * depth);
+      if (share < SMALL_SHARE || this.#isWithin(across, positions, i, depth, share)) sum += Math.min(1, share || 0);
+    }
+    return sum;
+  }
+
+  /** Whether the center of a splat lies in the image, or so near that the splat may. */
+  #isWithin(across: OrderView['across'], positions: Float32Array, i: number, depth: number, share: number): boolean {
+    const [p, q, r] = [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]];
+    const reach = 1 + 2 * Math.sqrt(share);
+    return across.every(([x, y, z, o, c]) => Math.abs((x * p + y * q + z * r + o) / depth + c) <= reach);
   }
 
   /** Keys of the splats within the range, their numbers, and how often each digit occurs. */
