@@ -31,7 +31,7 @@ export class OverdrawLimit {
    * @returns whether the next frame differs
    */
   note(covered: number, splats: number): boolean {
-    const share = Math.min(1, allowedFor(splats) / Math.max(1, covered));
+    const share = Math.min(1, allowedFor(splats) / covered);
     const isWorthwhile = share < this.share || share > WORTHWHILE * this.share || (share === 1 && this.share < 1);
     if (isWorthwhile) this.share = share < 1 ? share / WORTHWHILE : 1;
     return isWorthwhile;

@@ -65,14 +65,8 @@ export interface ViewpointOptions {
   readonly limitsOverdraw?: boolean;
 }
 
-/** One of several views: see {@link UncheckedViewpoint.drawAll}. */
-export interface View {
-  readonly camera: Camera;
-  readonly picture: FrameTarget;
-}
-
 /** A frame that has been encoded. */
-interface Encoded {
+export interface Encoded {
   /** The encoder to go on with. */
   readonly last: GPUCommandEncoder;
   /** Its counts are to be read. */
@@ -117,7 +111,7 @@ export class UncheckedViewpoint {
   #engine: Engine;
   /** By size, the one used last at the end. */
   readonly #accumulations = new Map<string, Accumulation>();
-  #mostSizes = 1;
+  protected mostSizes = 1;
   /** Of the last frame with auxiliary outputs. */
   #auxiliary: AuxiliaryTilePainter | undefined;
   /** Whether the last frame had to do without the code for its order. */
@@ -206,7 +200,7 @@ export class UncheckedViewpoint {
   draw(camera: Camera, picture: FrameTarget, settings: FrameSettings = this.#settings): void {
     const { timer } = picture;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const encoded = this.#encode(encoder, camera, picture, settings, true);
+    const encoded = this.encode(encoder, camera, picture, settings, true);
     const { last, isWatched, submissions, wishes, resources } = encoded;
     timer?.endFrame?.(last);
     for (const wish of wishes) wish.copy(last);
@@ -223,34 +217,8 @@ export class UncheckedViewpoint {
     for (const wish of wishes) wish.read();
   }
 
-  /**
-   * Records one frame into a host's encoder, between its passes, and submits nothing. The host submits within the same task: what the viewpoint learns of a frame
-   * (how much room it needs, which pages it asks for) it reads in the next one. Record a viewpoint once for each submission: its uniforms are those of
-   * the last frame that was recorded. `submissions` of the settings, and `timer` of the frame, are the host's.
-   * @throws GaussianSplatError as {@link draw} does.
-   */
-  record(
-    encoder: GPUCommandEncoder,
-    camera: Camera,
-    picture: FrameTarget,
-    settings: FrameSettings = this.#settings,
-  ): void {
-    const hosted = { ...picture, timer: undefined };
-    const encoded = this.#encode(encoder, camera, hosted, settings, false);
-    if (encoded.isWatched || encoded.wishes.length > 0) setTimeout(() => this.#readLater(encoded));
-  }
-
-  /**
-   * Draws several views of the world, such as both eyes or thumbnails: sizes that come again keep their buffers.
-   * @throws GaussianSplatError as {@link draw} does.
-   */
-  drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
-    const sizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`));
-    this.#mostSizes = Math.max(1, sizes.size);
-    for (const { camera, picture } of views) this.draw(camera, picture, settings);
-  }
-
-  #encode(
+  /** Records a frame. @param mayDivide whether it may be handed over in parts */
+  protected encode(
     encoder: GPUCommandEncoder,
     camera: Camera,
     picture: FrameTarget,
@@ -313,7 +281,7 @@ export class UncheckedViewpoint {
   }
 
   /** Reads what a frame left that a host has submitted. */
-  #readLater({ resources, isWatched, wishes }: Encoded): void {
+  protected readLater({ resources, isWatched, wishes }: Encoded): void {
     if (this.#engine.resources.current !== resources) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
     for (const wish of wishes) wish.copy(encoder);
@@ -543,7 +511,7 @@ export class UncheckedViewpoint {
       return known;
     }
     for (const old of this.#accumulations.keys()) {
-      if (this.#accumulations.size < this.#mostSizes) break;
+      if (this.#accumulations.size < this.mostSizes) break;
       this.#accumulations.get(old)!.texture.destroy();
       this.#accumulations.delete(old);
     }

@@ -92,7 +92,7 @@ export const SCENE_ATTRIBUTES = {
 
 export const MESH_ATTRIBUTES = {
   /**
-   * URL of a glTF or GLB file. The property takes a `File` or `Blob` as well.
+   * URL of a glTF, GLB or PLY file. The property takes a `File` or `Blob` as well.
    * @example src="chair.glb"
    */
   src: text<string | Blob | null>(),
