@@ -88,7 +88,9 @@ const PLY_HEADER = (encoding: string, vertices: string, faces: number, count = 4
 const XYZ = 'property float x\nproperty float y\nproperty float z\n';
 const RGB = 'property uchar red\nproperty uchar green\nproperty uchar blue\n';
 const text = (content: string): Uint8Array => new TextEncoder().encode(content);
-const floatsIn = (view: TriangleFile['views'][number]): number[] => [...new Float32Array((view as Uint8Array).slice().buffer)];
+const floatsIn = (view: TriangleFile['views'][number]): number[] => [
+  ...new Float32Array((view as Uint8Array).slice().buffer),
+];
 
 test('a PLY mesh: polygons as fans, colors linear, either byte order, and text', async () => {
   const rows = ['0 0 0 255 0 0', '1 0 0 0 255 0', '1 1 0 0 0 255', '0 1 nan 188 188 188'];
@@ -119,13 +121,17 @@ test('a PLY that is no mesh, or asks for more than it has, is refused by name', 
   const corner = '0 0 0\n'.repeat(4);
   const cases: [string, RegExp][] = [
     [`ply\nformat ascii 1.0\nelement vertex 1\n${XYZ}end_header\n0 0 0\n`, /faces with vertex_indices.*decode\/empty/],
-    [`${PLY_HEADER('ascii', XYZ, 1)}${corner}0 3 0 1 4\n`, /face 0: expected a vertex from 0 to 3, found 4.*decode\/corrupt/],
+    [
+      `${PLY_HEADER('ascii', XYZ, 1)}${corner}0 3 0 1 4\n`,
+      /face 0: expected a vertex from 0 to 3, found 4.*decode\/corrupt/,
+    ],
     [`${PLY_HEADER('ascii', XYZ, 1)}${corner}0 3 0 -1 2\n`, /decode\/corrupt/],
     [`${PLY_HEADER('ascii', XYZ, 2)}${corner}0 3 0 1 2\n`, /decode\/truncated/],
     [PLY_HEADER('binary_little_endian', XYZ, 1, 50_000_000), /decode\/truncated/],
     [`${PLY_HEADER('ascii', XYZ, 1)}${corner}0 1000000 0 1 2\n`, /decode\/truncated/],
   ];
-  for (const [file, message] of cases) await assert.rejects(read(text(file)), ({ message: found }: Error) => message.test(found), file.slice(0, 40));
+  for (const [file, message] of cases)
+    await assert.rejects(read(text(file)), ({ message: found }: Error) => message.test(found), file.slice(0, 40));
 });
 
 test('faces of a PLY with very many sides cost what they weigh', async () => {

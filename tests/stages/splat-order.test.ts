@@ -68,7 +68,10 @@ test('the sum of the areas on screen says how often the image is covered', () =>
   splats.sort(orderView(far, [0, 0, 0]), order);
   assert.ok(splats.covered < 1, `${splats.covered} from afar`);
   areas.fill(0.5);
-  const beside = new SplatOrder(positions.map((_, i) => (i % 3 === 0 ? 40 : 0)), areas);
+  const beside = new SplatOrder(
+    positions.map((_, i) => (i % 3 === 0 ? 40 : 0)),
+    areas,
+  );
   beside.sort(orderView(camera, [0, 0, 0]), order);
   assert.ok(beside.covered < 300, `${beside.covered} beside the image`);
 });

@@ -146,7 +146,11 @@ export class CapacityMonitor {
   }
 
   /** Records the copy of the counts. */
-  record(encoder: GPUCommandEncoder, { plan, gathered }: Pick<Scratch, 'plan' | 'gathered'>, pairPlan: GPUBuffer | undefined): void {
+  record(
+    encoder: GPUCommandEncoder,
+    { plan, gathered }: Pick<Scratch, 'plan' | 'gathered'>,
+    pairPlan: GPUBuffer | undefined,
+  ): void {
     copyCounts(encoder, plan, pairPlan, this.#staging, 0);
     encoder.copyBufferToBuffer(gathered, 4 * constants.COVERED, this.#staging, COUNT_BYTES - 4, 4);
     this.#isReading = true;

@@ -120,7 +120,11 @@ export class UncheckedViewpoint {
   #last: (ProbeSource & { readonly scale: number }) | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if settings need a feature that the device lacks. */
-  constructor(device: GPUDevice, world: World, { settings = {}, onIncomplete, limitsOverdraw = false }: ViewpointOptions = {}) {
+  constructor(
+    device: GPUDevice,
+    world: World,
+    { settings = {}, onIncomplete, limitsOverdraw = false }: ViewpointOptions = {},
+  ) {
     this.#device = device;
     this.world = world;
     this.#variants = variantsOf(device);
@@ -257,11 +261,14 @@ export class UncheckedViewpoint {
       keepsDepths: depth !== undefined && !order,
       timer,
     });
-    const isWatched = monitor.isDue(rasterizer.pairPlan !== undefined || this.#overdraw?.mayExceed(table.splats) === true, {
-      pixels: drawn.width * drawn.height,
-      wholePixels: camera.width * camera.height,
-      isWhole: isWhole(levers, this.resolvedSettings),
-    });
+    const isWatched = monitor.isDue(
+      rasterizer.pairPlan !== undefined || this.#overdraw?.mayExceed(table.splats) === true,
+      {
+        pixels: drawn.width * drawn.height,
+        wholePixels: camera.width * camera.height,
+        isWhole: isWhole(levers, this.resolvedSettings),
+      },
+    );
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
     const how = { levers, timer, ...this.#wayToPaint(picture, levers, drawn, scratch, order) };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);

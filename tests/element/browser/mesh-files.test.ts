@@ -102,7 +102,10 @@ describe('files of meshes', () => {
     const length = new DataView(bytes.buffer).getUint32(12, true);
     const text = new TextDecoder().decode(bytes.subarray(20, 20 + length));
     // The accessor of the box's corners is the first; without a view it is 90 million zeros.
-    const corners = text.replace('"bufferView":0,"componentType":5126,"count":24', '"componentType":5126,"count":90000000');
+    const corners = text.replace(
+      '"bufferView":0,"componentType":5126,"count":24',
+      '"componentType":5126,"count":90000000',
+    );
     const changed = corners.trimEnd().padEnd(length);
     assert(changed.length === length && corners !== text, 'as long as before');
     bytes.set(new TextEncoder().encode(changed), 20);

@@ -148,7 +148,12 @@ export type PageMessage =
   /** Pack what comes through the port. */
   | { readonly type: 'pack'; readonly port: MessagePort }
   /** Sort splats, at these positions, for the views that come through the port. */
-  | { readonly type: 'sort'; readonly port: MessagePort; readonly positions: Float32Array; readonly areas: Float32Array }
+  | {
+      readonly type: 'sort';
+      readonly port: MessagePort;
+      readonly positions: Float32Array;
+      readonly areas: Float32Array;
+    }
   /** Run a generator once on the CPU, in a worker that is started for it. */
   | CpuRunMessage;
 

@@ -1,5 +1,11 @@
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
-import { isSameView, orderView, OverdrawLimit, drawn as whenDrawn, type OrderView } from '@gaussian-splat/renderer/webgl';
+import {
+  isSameView,
+  orderView,
+  OverdrawLimit,
+  drawn as whenDrawn,
+  type OrderView,
+} from '@gaussian-splat/renderer/webgl';
 import type { CanvasFrame, Painter, PainterEvents, Place, ReadCounts, Rendering, Surface } from '../gpu/painter.js';
 import { DepthSorter, type SortedSplats } from './depth-sorter.js';
 import type { GlLoaded } from './gl-loaded.js';

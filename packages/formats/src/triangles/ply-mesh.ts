@@ -49,7 +49,10 @@ export function readPlyMesh({ bytes, name, budget }: TriangleSource): TriangleFi
   const attributes: Record<string, Accessor> = { POSITION: positionsOf(positions!) };
   if (normals) attributes.NORMAL = floats(normals, 'VEC3');
   if (colors) attributes.COLOR_0 = colorsOf(colors, alpha, vertex);
-  const all = [...Object.values(attributes), { bytes: bytesOf(indices), json: { componentType: UNSIGNED_INT, count: indices.length, type: 'SCALAR' } }];
+  const all = [
+    ...Object.values(attributes),
+    { bytes: bytesOf(indices), json: { componentType: UNSIGNED_INT, count: indices.length, type: 'SCALAR' } },
+  ];
   return {
     json: documentOf(Object.keys(attributes), all, alpha !== undefined),
     views: all.map((accessor) => accessor.bytes),
@@ -64,26 +67,41 @@ const NO_TEXTURE = 'The texture of a PLY mesh is not shown; export the mesh as G
 
 /** The names of columns in an element; undefined where one is missing. */
 function namesIn({ properties }: PlyElement, columns: readonly (readonly string[])[]): string[] | undefined {
-  const found = columns.map((names) => properties.find((each) => names.includes(each.name) && !each.listCountType)?.name);
+  const found = columns.map(
+    (names) => properties.find((each) => names.includes(each.name) && !each.listCountType)?.name,
+  );
   return found.includes(undefined) ? undefined : (found as string[]);
 }
 
 /** Columns of all vertices, row by row; undefined where the file does not have them. */
-function columnsOf(data: ElementData, columns: readonly (readonly string[])[], source: SceneSource): Float32Array<ArrayBuffer> | undefined {
+function columnsOf(
+  data: ElementData,
+  columns: readonly (readonly string[])[],
+  source: SceneSource,
+): Float32Array<ArrayBuffer> | undefined {
   const names = namesIn(data.element, columns);
   if (!names) return undefined;
   const stride = names.length;
   // The page has it, and the GPU.
   source.budget?.take(8 * stride * data.element.count, source.name);
   const array = new Float32Array(stride * data.element.count);
-  readColumns(data, names.map((property, offset): ColumnTarget => ({ property, array, stride, offset })));
+  readColumns(
+    data,
+    names.map((property, offset): ColumnTarget => ({ property, array, stride, offset })),
+  );
   return array;
 }
 
 /** Corners of the triangles that polygons are fans of. Those that refer to a vertex without a place are left out. */
-function trianglesOf(data: ElementData, list: PlyProperty, positions: Float32Array, source: SceneSource): Uint32Array<ArrayBuffer> {
+function trianglesOf(
+  data: ElementData,
+  list: PlyProperty,
+  positions: Float32Array,
+  source: SceneSource,
+): Uint32Array<ArrayBuffer> {
   const count = positions.length / 3;
-  const isPlaced = (i: number): boolean => Number.isFinite(positions[3 * i] + positions[3 * i + 1] + positions[3 * i + 2]);
+  const isPlaced = (i: number): boolean =>
+    Number.isFinite(positions[3 * i] + positions[3 * i + 1] + positions[3 * i + 2]);
   const cursor = cursorAt(data);
   let corners = new Uint32Array(0);
   let used = 0;
@@ -112,13 +130,18 @@ function trianglesOf(data: ElementData, list: PlyProperty, positions: Float32Arr
         const corner = cursor.next(list.type);
         if (cursor.ended) break;
         if (!(corner >= 0 && corner < count && Number.isInteger(corner)))
-          throw damaged(`${source.name}, face ${grouped(row)}`, `a vertex from 0 to ${grouped(count - 1)}`, String(corner));
+          throw damaged(
+            `${source.name}, face ${grouped(row)}`,
+            `a vertex from 0 to ${grouped(count - 1)}`,
+            String(corner),
+          );
         if (k === 0) first = corner;
         else if (k > 1 && isPlaced(first) && isPlaced(last) && isPlaced(corner)) add(first, last, corner);
         last = corner;
       }
     }
-    if (cursor.ended) throw damaged(source.name, `${grouped(data.element.count)} faces`, grouped(row), 'decode/truncated');
+    if (cursor.ended)
+      throw damaged(source.name, `${grouped(data.element.count)} faces`, grouped(row), 'decode/truncated');
   }
   return corners.slice(0, used);
 }
@@ -180,7 +203,11 @@ function noFaces(where: string, { elements }: PlyHeader): GaussianSplatError {
   return new GaussianSplatError('decode/empty', {
     where,
     expected: 'vertices with x, y and z, and faces with vertex_indices',
-    found: elements.map(({ name, count }) => `${grouped(count)} ${name}`.slice(0, 60)).slice(0, 8).join(', ') || 'no elements',
+    found:
+      elements
+        .map(({ name, count }) => `${grouped(count)} ${name}`.slice(0, 60))
+        .slice(0, 8)
+        .join(', ') || 'no elements',
     remedy: isSplats(elements) ? 'show splats by src of <gaussian-splat>' : 'export a mesh with faces',
   });
 }
