@@ -3,8 +3,8 @@ import { constants } from './generated/shaders.js';
 /** Times that splats may cover a frame at full size: some, and more for larger scenes. Captured scenes have some tens to some hundreds. */
 const FREE_FRAMES = 1_000;
 const FRAMES_PER_SPLAT = 1 / 500;
-/** A change of the share that is worth another frame. */
-const WORTHWHILE = 1.25;
+/** Frames are drawn with so many times fewer pixels a side than they might be. */
+const MARGIN = 1.25;
 const NO_LIMIT = 0xffffffff;
 
 /**
@@ -31,10 +31,11 @@ export class OverdrawLimit {
    * @returns whether the next frame differs
    */
   note(covered: number, splats: number): boolean {
-    const share = Math.min(1, allowedFor(splats) / covered);
-    const isWorthwhile = share < this.share || share > WORTHWHILE * this.share || (share === 1 && this.share < 1);
-    if (isWorthwhile) this.share = share < 1 ? share / WORTHWHILE : 1;
-    return isWorthwhile;
+    const before = this.share;
+    const most = allowedFor(splats) / covered;
+    // There is a margin on both sides: at rest the same view never goes back and forth.
+    if (most < before || most > MARGIN * MARGIN * before) this.share = Math.min(1, most / MARGIN);
+    return this.share !== before;
   }
 }
 
