@@ -1,5 +1,6 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
+import type { Scratch } from './scratch.js';
 
 /** Counts of one frame. */
 export interface FrameStatistics {
@@ -19,28 +20,26 @@ export interface FrameStatistics {
   readonly covered: number;
 }
 
-/** The buffers that hold the counts. */
-export interface Counters {
-  /** `Plan` of the splats and, with tiles, of the pairs. */
-  readonly plan: GPUBuffer;
-  readonly pairPlan?: GPUBuffer;
-  /** See shaders/shared/gathered.wgsl. */
-  readonly gathered: GPUBuffer;
-  /** Its last word is what a budget asks for: see `Scratch.chunkShares`. */
-  readonly chunkShares: GPUBuffer;
-}
-
-/** Reads the counts back. */
-export async function readStatistics(device: GPUDevice, counters: Counters): Promise<FrameStatistics> {
+/**
+ * Reads the counts back.
+ * @param scratch of the last frame; undefined before there is one
+ * @param pairPlan `Plan` of the pairs, with tiles
+ */
+export async function readStatistics(
+  device: GPUDevice,
+  scratch: Pick<Scratch, 'plan' | 'gathered' | 'chunkShares'> | undefined,
+  pairPlan: GPUBuffer | undefined,
+): Promise<FrameStatistics> {
+  if (!scratch) return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0, covered: 0 };
   const { visible, overflow } = layouts.Plan.fields;
   const sources: [GPUBuffer | undefined, number][] = [
-    [counters.plan, visible.offset],
-    [counters.plan, overflow.offset],
-    [counters.pairPlan, visible.offset],
-    [counters.pairPlan, overflow.offset],
-    [counters.gathered, 4 * constants.UNUSABLE],
-    [counters.chunkShares, counters.chunkShares.size - 4],
-    [counters.gathered, 4 * constants.COVERED],
+    [scratch.plan, visible.offset],
+    [scratch.plan, overflow.offset],
+    [pairPlan, visible.offset],
+    [pairPlan, overflow.offset],
+    [scratch.gathered, 4 * constants.UNUSABLE],
+    [scratch.chunkShares, scratch.chunkShares.size - 4],
+    [scratch.gathered, 4 * constants.COVERED],
   ];
   const staging = device.createBuffer({
     label: 'gs.statistics',

@@ -301,11 +301,8 @@ export class UncheckedViewpoint {
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
   async statistics(): Promise<FrameStatistics> {
     const { readStatistics } = await loadModule('the code for counts', () => import('./statistics.js'));
-    const resources = this.#engine.resources.current;
-    if (resources === undefined)
-      return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0, covered: 0 };
-    const { plan, gathered, chunkShares } = resources.scratch;
-    return readStatistics(this.#device, { plan, gathered, chunkShares, pairPlan: this.#engine.rasterizer.pairPlan });
+    const { scratch } = this.#engine.resources.current ?? {};
+    return readStatistics(this.#device, scratch, this.#engine.rasterizer.pairPlan);
   }
 
   /** What orders the splats of a frame pixel by pixel; undefined where nothing does, or not yet: then {@link ViewpointOptions.onIncomplete} says when. */
