@@ -16,6 +16,7 @@ const generatedOf = (name) => fileURLToPath(new URL(`../packages/${name}/src/gen
 const RARE = {
   'budget-shaders': ['detail_allow', 'detail_count'],
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
+  'clip-shaders': ['animate'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
   'auxiliary-shaders': ['rasterize_tiles_auxiliary'],
@@ -135,6 +136,9 @@ function saidBy(named, isMeant) {
   return [...named].filter(([, { homes }]) => isMeant(homes)).map(([name, { value }]) => [name, value]);
 }
 
+/** Files whose own structs lie beside them: pages without these stages do not load their layouts either. */
+const LAYOUTS = { 'clip-shaders': 'clip-layouts', 'live-shaders': 'live-layouts' };
+const layoutsOf = (homes) => (homes.size === 1 ? LAYOUTS[[...homes][0]] : undefined);
 const isOfRenderer = (homes) => [...homes].some((file) => file !== ECONOMISE);
 const byName = ([a], [b]) => (a < b ? -1 : 1);
 
@@ -158,8 +162,18 @@ const files = {
   // Modules and not objects, so that bundlers leave out what nobody uses.
   layouts: [
     '/** Byte sizes and offsets of the WGSL structs. */',
-    ...saidBy(structs, isOfRenderer).sort(byName).map(define),
+    ...saidBy(structs, (homes) => isOfRenderer(homes) && !layoutsOf(homes))
+      .sort(byName)
+      .map(define),
   ],
+  ...Object.fromEntries(
+    Object.values(LAYOUTS).map((file) => [
+      file,
+      saidBy(structs, (homes) => layoutsOf(homes) === file)
+        .sort(byName)
+        .map(define),
+    ]),
+  ),
   constants: [
     '/** Numeric constants of the WGSL, by their names there. */',
     ...saidBy(constants, isOfRenderer).map(define),

@@ -3,8 +3,7 @@
 // that cannot be used become zeros, which `cull` counts as unusable.
 #import shared/packed_gaussian
 #import shared/sh
-#import shared/falloff
-#import shared/chunk
+#import shared/written_gaussian
 #import shared/group
 
 struct Ingest {
@@ -62,8 +61,6 @@ const COLORS = 3u;
 const OPACITIES = 4u;
 
 const HALF_MAX = 65504.0;
-// Larger than any coordinate that can be drawn; WGSL knows no infinity.
-const BEYOND = 1e30;
 const LARGEST_LOG = 88.0;
 
 fn tensor_word(tensor: u32, word: u32) -> u32 {
@@ -100,24 +97,6 @@ fn triple_of(tensor: u32, slice: vec2u, row: u32, component: u32) -> vec3u {
 
 fn are_finite(words: vec3u) -> bool {
   return has_finite_bits(vec4u(words, 0u));
-}
-
-// Lower triangular root of a covariance, Σ = L Lᵀ.
-struct Factor {
-  // xx, yx, zx; yy, zy; zz
-  x: vec3f,
-  y: vec2f,
-  z: f32,
-  usable: bool,
-}
-
-fn no_factor() -> Factor {
-  return Factor(vec3f(0.0), vec2f(0.0), 0.0, false);
-}
-
-fn ratio(a: f32, b: f32) -> f32 {
-  if (b > 0.0) { return a / b; }
-  return 0.0;
 }
 
 // Cholesky's factor. Needles and discs have pivots that are mere rounding, or even negative: no number may then exceed what the
@@ -157,26 +136,7 @@ fn factor_of_axes(row: u32) -> Factor {
   if (!has_finite_bits(vec4u(head, tail)) || any(scales < vec3f(0.0))) { return no_factor(); }
   var q = bitcast<vec4f>(vec4u(head, tail));
   if (ingest.is_w_first != 0u) { q = q.yzwx; }
-  // Divided by the largest first: squares of tiny or huge components would leave float32's range.
-  let largest = max(max(abs(q.x), abs(q.y)), max(abs(q.z), abs(q.w)));
-  if (largest <= 0.0) { return no_factor(); }
-  q /= largest;
-  q /= sqrt(dot(q, q));
-  let twice = 2.0 * q.xyz;
-  let a = vec3f(1.0 - twice.y * q.y - twice.z * q.z, twice.x * q.y - twice.z * q.w, twice.x * q.z + twice.y * q.w) * scales;
-  var b = vec3f(twice.x * q.y + twice.z * q.w, 1.0 - twice.x * q.x - twice.z * q.z, twice.y * q.z - twice.x * q.w) * scales;
-  var c = vec3f(twice.x * q.z - twice.y * q.w, twice.y * q.z + twice.x * q.w, 1.0 - twice.x * q.x - twice.y * q.y) * scales;
-  let xx = length(a);
-  // A row of length 0 is orthogonal to everything.
-  let x = vec3f(ratio(a.x, xx), ratio(a.y, xx), ratio(a.z, xx));
-  let yx = dot(x, b);
-  let zx = dot(x, c);
-  b -= yx * x;
-  c -= zx * x;
-  let yy = length(b);
-  let y = vec3f(ratio(b.x, yy), ratio(b.y, yy), ratio(b.z, yy));
-  let zy = dot(y, c);
-  return Factor(vec3f(xx, yx, zx), vec2f(yy, zy), length(c - zy * y), true);
+  return factor_of(q, scales);
 }
 
 struct Opacity {
@@ -192,30 +152,6 @@ fn opacity_of(row: u32) -> Opacity {
   if (!is_finite) { return Opacity(select(1.0, 0.0, written == 0xff800000u), (written & 0x007fffffu) == 0u); }
   let logit = clamp(bitcast<f32>(written), -LARGEST_LOG, LARGEST_LOG);
   return Opacity(1.0 / (1.0 + exp(-logit)), true);
-}
-
-// The highest bits of a float32, to the nearest: those that PackedGaussian keeps.
-fn high_22(value: f32) -> u32 { return (bitcast<u32>(value) + 0x200u) >> 10u; }
-
-// 28 of them, on the same side of 1/255 as the opacity: splats below it are not drawn.
-fn high_28(opacity: f32) -> u32 {
-  let first_visible = (bitcast<u32>(ALPHA_MIN) + 15u) >> 4u;
-  let nearest = (bitcast<u32>(opacity) + 8u) >> 4u;
-  return select(min(nearest, first_visible - 1u), max(nearest, first_visible), opacity >= ALPHA_MIN);
-}
-
-fn pack_gaussian(position: vec3u, f: Factor, opacity: f32) -> PackedGaussian {
-  let last = high_22(f.z);
-  let visible = high_28(opacity);
-  return PackedGaussian(
-    vec4u(position, (high_22(f.x.x) << 10u) | (last >> 12u)),
-    vec4u(
-      (high_22(f.x.y) << 10u) | ((last >> 2u) & 0x3ffu),
-      (high_22(f.y.x) << 10u) | ((last & 3u) << 8u) | (visible >> 20u),
-      (high_22(f.x.z) << 10u) | ((visible >> 10u) & 0x3ffu),
-      (high_22(f.y.y) << 10u) | (visible & 0x3ffu),
-    ),
-  );
 }
 
 // Bits of number k of a row's harmonics in the order [coefficient][channel].
@@ -248,10 +184,6 @@ fn pack_harmonics(row: u32) -> bool {
   return usable;
 }
 
-// Lowest corner and minus the reach; highest corner.
-var<workgroup> lows: array<vec4f, CULL_GROUP>;
-var<workgroup> highs: array<vec3f, CULL_GROUP>;
-
 // Packs a row that lives and notes its bounds.
 fn ingest_row(row: u32, lane: u32) -> PackedGaussian {
   let nothing = PackedGaussian(vec4u(0u), vec4u(0u));
@@ -263,12 +195,7 @@ fn ingest_row(row: u32, lane: u32) -> PackedGaussian {
   if (!(are_finite(position) && opacity.usable && factor.usable && has_color)) { return nothing; }
   let packed = pack_gaussian(position, factor, opacity.value);
   if (!is_usable(packed)) { return nothing; }
-  let center = bitcast<vec3f>(position);
-  // No axis is longer than the factor as a whole. A little more for what packing rounds away.
-  let longest = 1.001 * length(vec3f(length(factor.x), length(factor.y), factor.z));
-  let reach = longest * sqrt(2.0 * log(max(opacity.value / ALPHA_MIN, 1.0)));
-  lows[lane] = vec4f(center, -reach);
-  highs[lane] = center;
+  note_reach(lane, bitcast<vec3f>(position), factor, opacity.value);
   return packed;
 }
 
@@ -277,27 +204,15 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let chunk = group_index(workgroup_id);
   let row = chunk * CULL_GROUP + lane;
   let living = min(u32(max(ingest.count, 0)), ingest.rows);
-  lows[lane] = vec4f(vec3f(BEYOND), 0.0);
-  highs[lane] = vec3f(-BEYOND);
+  note_nothing(lane);
   if (row < ingest.page_rows) {
     if (ingest.first_row + row < living) {
       gaussians[row] = ingest_row(row, lane);
     } else {
-      // An extent of 1 and an opacity of 0: in order, and not drawn.
-      gaussians[row] = PackedGaussian(vec4u(0u, 0u, 0u, bitcast<u32>(1.0)), vec4u(0u));
+      gaussians[row] = unseen_gaussian();
     }
   }
-  workgroupBarrier();
-  for (var half = CULL_GROUP / 2u; half > 0u; half /= 2u) {
-    if (lane < half) {
-      lows[lane] = min(lows[lane], lows[lane + half]);
-      highs[lane] = max(highs[lane], highs[lane + half]);
-    }
-    workgroupBarrier();
-  }
+  let bounds = chunk_of_group(lane);
   // Rows without a chunk may be threads of the last row of workgroups.
-  if (lane == 0u && chunk * CULL_GROUP < ingest.page_rows) {
-    // A chunk without any splat is a box turned inside out, which no camera sees.
-    chunks[chunk] = Chunk(lows[0].xyz, -lows[0].w, highs[0], 0.0);
-  }
+  if (lane == 0u && chunk * CULL_GROUP < ingest.page_rows) { chunks[chunk] = bounds; }
 }

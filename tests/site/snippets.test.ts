@@ -10,6 +10,8 @@ import { build } from 'esbuild';
 import { PNG } from 'pngjs';
 import ts from 'typescript';
 import { compileTemplate, parse } from 'vue/compiler-sfc';
+import { clipOf } from '../support/clips.js';
+import { fountain } from '../support/scenes/fountain.js';
 import { isBuilt, openSite, root } from './support.js';
 import { snippets, type Snippet } from './snippets.js';
 
@@ -244,6 +246,11 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
     route.fulfill({ body: bodies.get(new URL(route.request().url()).pathname.split('/').pop()!) }),
   );
   await tab.route('**/sequence.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
+  const clip = await clipOf(fountain({ splats: 300, frames: 8, framesPerSecond: 10 }), {
+    frames: 8,
+    framesPerGroup: 4,
+  });
+  await tab.route('**/fountain.gsv', (route) => route.fulfill({ body: Buffer.from(clip.bytes) }));
   await tab.route('**/style.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/post-fixed.onnx') }));
   await tab.route(/\/(walker|ball)\.onnx$/, (route) => route.fulfill({ body: fixture('fixtures/generators/packed.onnx') })); // prettier-ignore
 }

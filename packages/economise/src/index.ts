@@ -27,3 +27,4 @@ export { filesOfZip } from './write/zip.js';
 export { codeSequence, type CodedSequence, type CodeSequenceOptions } from './motion/code-sequence.js';
 export { withNearAxes } from './motion/near-axes.js';
 export { writeMotion, type MotionOptions, type MotionSteps } from './motion/write-motion.js';
+export { codeClip, type CodeClipOptions, type CodedClip } from './clip/code-clip.js';

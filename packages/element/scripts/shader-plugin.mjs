@@ -10,6 +10,7 @@ export const SHADER_FILES = [
   'auxiliary-shaders.js',
   'budget-shaders.js',
   'live-shaders.js',
+  'clip-shaders.js',
   'streamed-shaders.js',
   'quantized-shaders.js',
   'probe-shaders.js',

@@ -77,6 +77,8 @@ export interface GaussianSplatEventMap {
   /** Loading and time, as of HTMLMediaElement. */
   play: Event;
   playing: Event;
+  /** A clip has to wait for what comes next; `playing` follows. */
+  waiting: Event;
   pause: Event;
   timeupdate: Event;
   seeking: Event;

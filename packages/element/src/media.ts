@@ -1,5 +1,6 @@
 import { notPlayed } from './controllers/playback-controller.js';
 import { SplatProperties } from './properties.js';
+import type { Timeline } from './live/live-model.js';
 import type { Stage } from './stage.js';
 import { SceneTimeRanges } from './time-ranges.js';
 import type { LitElement } from 'lit';
@@ -13,8 +14,9 @@ export type SettableProperties = Partial<
     Pick<MediaProperties, 'currentTime' | 'playbackRate'>
 >;
 
-/** What HTMLMediaElement.readyState says of a scene: nothing yet, or all there is. */
+/** What HTMLMediaElement.readyState says of a scene: nothing yet, the last image and no more, or all that comes next. */
 const HAVE_NOTHING = 0;
+const HAVE_CURRENT_DATA = 2;
 const HAVE_ENOUGH_DATA = 4;
 
 const isSaid = (value: number | null | undefined): boolean => value !== null && value !== undefined;
@@ -66,9 +68,10 @@ export abstract class MediaProperties extends SplatProperties {
     this.stage.playback.playbackRate = isSaid(rate) ? rate : 1;
   }
 
-  /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is shown. */
+  /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is shown, 2 while a clip has to wait for what comes next. */
   get readyState(): number {
-    return this.stage.sources.state === 'ready' ? HAVE_ENOUGH_DATA : HAVE_NOTHING;
+    if (this.stage.sources.state !== 'ready') return HAVE_NOTHING;
+    return this.#live?.isLacking?.(this.currentTime) ? HAVE_CURRENT_DATA : HAVE_ENOUGH_DATA;
   }
 
   /** Times that can be sought: all of a scene with an end, none of others. */
@@ -76,9 +79,13 @@ export abstract class MediaProperties extends SplatProperties {
     return new SceneTimeRanges(this.duration);
   }
 
-  /** Times that need no more bytes: the same. */
+  /** Times that need no more bytes: the same, but for a clip, of which groups come and go. */
   get buffered(): SceneTimeRanges {
-    return new SceneTimeRanges(this.duration);
+    return new SceneTimeRanges(this.duration, this.#live?.buffered);
+  }
+
+  get #live(): Timeline | undefined {
+    return this.stage.sources.own.member?.scene.live;
   }
 
   /** Fetches the scene again, as if `src` had just been set: after an error, or when the file has changed. */

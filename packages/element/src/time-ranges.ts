@@ -1,30 +1,35 @@
-/** Spans of a scene's time in the shape of the platform's TimeRanges, which scripts cannot make: none, or one from 0 on. */
+/** Spans of a scene's time in the shape of the platform's TimeRanges, which scripts cannot make. */
 export class SceneTimeRanges {
-  readonly #end: number;
+  readonly #spans: readonly (readonly [start: number, end: number])[];
 
-  /** @param end seconds; NaN, 0 and Infinity make an empty list. */
-  constructor(end: number) {
-    this.#end = Number.isFinite(end) && end > 0 ? end : 0;
+  /**
+   * @param end seconds; NaN, 0 and Infinity make an empty list, others one span from 0 on
+   * @param spans in place of that
+   */
+  constructor(
+    end: number,
+    spans: readonly (readonly [start: number, end: number])[] | undefined = end > 0 && end < Infinity ? [[0, end]] : [],
+  ) {
+    this.#spans = spans;
   }
 
   get length(): number {
-    return this.#end > 0 ? 1 : 0;
+    return this.#spans.length;
   }
 
   /** Seconds. Throws an `IndexSizeError` for a span that is not there. */
   start(index: number): number {
-    this.#require(index);
-    return 0;
+    return this.#at(index)[0];
   }
 
   /** Seconds, likewise. */
   end(index: number): number {
-    this.#require(index);
-    return this.#end;
+    return this.#at(index)[1];
   }
 
-  #require(index: number): void {
-    if (index >= 0 && index < this.length) return;
+  #at(index: number): readonly [number, number] {
+    const span = this.#spans[index];
+    if (span) return span;
     throw new DOMException(`there are ${this.length} spans, and no number ${index}`, 'IndexSizeError');
   }
 }

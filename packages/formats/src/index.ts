@@ -2,6 +2,7 @@ export { LoadBudget, type LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
 export { fetchScene, openPartAt, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './late-formats.js';
+export { fetchRange, type FetchedRange } from './fetch-range.js';
 export { outOfMemory } from './scene-errors.js';
 export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';
 export { readCoarsest } from './lod/read-coarsest.js';
@@ -31,11 +32,27 @@ export {
   MOVING,
   MOVING_NAMES,
   readMotion,
+  type Lives,
   type Motion,
   type MotionFile,
   type MovingName,
   type MovingPart,
 } from './motion.js';
+export {
+  clipFrame,
+  CLIP_HEAD_BYTES,
+  clipGroupAt,
+  clipIndexBytes,
+  MAX_CLIP_INDEX_BYTES,
+  parseClip,
+  readClipPart,
+  writeClipHead,
+  type ClipGroup,
+  type ClipHead,
+  type ClipIndex,
+  type ClipPart,
+  type ClipPartContent,
+} from './clip.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
 export { turned, upright, uprightRotation } from './transform/upright.js';

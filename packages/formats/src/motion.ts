@@ -10,7 +10,9 @@ export const MOVING = { position: 3, rotation: 3, scale: 3, opacity: 1, color: 3
 export type MovingName = keyof typeof MOVING;
 export const MOVING_NAMES = Object.keys(MOVING) as readonly MovingName[];
 
-export const MOTION_VERSION = 1;
+/** Of files whose splats are all there in every frame, and of those that say of each splat in which frames it is. */
+export const MOTION_VERSION = { everywhere: 1, lives: 2 } as const;
+type MotionVersion = (typeof MOTION_VERSION)[keyof typeof MOTION_VERSION];
 /** Version, splats, frames; a rank and a step for each of {@link MOVING}. */
 const HEAD_BYTES = 4 * (3 + 2 * MOVING_NAMES.length);
 /** Compressed bytes handed over at once, see Gunzip. */
@@ -31,11 +33,19 @@ export interface MovingPart {
   readonly codes: readonly Int16Array[];
 }
 
+/** Frames that each splat is in: those from `first` on, before `end`. */
+export interface Lives {
+  readonly first: Uint16Array;
+  readonly end: Uint16Array;
+}
+
 /** What some frames of a sequence differ by from the first. */
 export interface Motion {
   readonly splats: number;
   readonly frames: number;
   readonly parts: Readonly<Record<MovingName, MovingPart>>;
+  /** Undefined: every splat is in all frames. */
+  readonly lives?: Lives;
 }
 
 /** What a file must fit: splats of the first frame, and frames that the manifest gives it. */
@@ -45,6 +55,8 @@ export interface MotionFile {
   readonly splats: number;
   readonly frames: number;
   readonly budget: LoadBudget;
+  /** One of {@link MOTION_VERSION}; default `everywhere`. */
+  readonly version?: MotionVersion;
 }
 
 /**
@@ -55,7 +67,7 @@ export async function readMotion({ bytes, name, ...asked }: MotionFile): Promise
   return new MotionReader(await inflate(await checkedPart(bytes, name), name, asked), name, asked).read();
 }
 
-type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget'>;
+type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget' | 'version'>;
 
 /** Inflates a file, of whose head all else follows: no more than that is held. */
 async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<Uint8Array> {
@@ -97,11 +109,15 @@ const wrongLength = (name: string, expected: number, found: string): GaussianSpl
 const rankAt = (view: DataView, k: number): number => view.getUint32(12 + 8 * k, true);
 
 /** Bytes that a file inflates to, by its head. */
-function lengthFrom(head: Uint8Array, name: string, { splats, frames }: Asked): number {
+function lengthFrom(
+  head: Uint8Array,
+  name: string,
+  { splats, frames, version = MOTION_VERSION.everywhere }: Asked,
+): number {
   const view = viewOf(head);
-  const [version, ownSplats, ownFrames] = [0, 4, 8].map((at) => view.getUint32(at, true));
-  if (version !== MOTION_VERSION)
-    throw damaged(name, `motion of version ${MOTION_VERSION}`, `version ${version}`, 'decode/unsupported');
+  const [ownVersion, ownSplats, ownFrames] = [0, 4, 8].map((at) => view.getUint32(at, true));
+  if (ownVersion !== version)
+    throw damaged(name, `motion of version ${version}`, `version ${ownVersion}`, 'decode/unsupported');
   if (ownSplats !== splats || ownFrames !== frames) {
     throw damaged(
       name,
@@ -110,12 +126,17 @@ function lengthFrom(head: Uint8Array, name: string, { splats, frames }: Asked): 
       'decode/header',
     );
   }
-  return MOVING_NAMES.reduce((sum, part, k) => {
-    const rank = rankAt(view, k);
-    if (rank > frames) throw damaged(name, `at most ${frames} curves`, `${rank} for ${part}`, 'decode/header');
-    return sum + 4 * frames * rank + MOVING[part] * rank * (1 + 2 * splats);
-  }, HEAD_BYTES);
+  return MOVING_NAMES.reduce(
+    (sum, part, k) => {
+      const rank = rankAt(view, k);
+      if (rank > frames) throw damaged(name, `at most ${frames} curves`, `${rank} for ${part}`, 'decode/header');
+      return sum + 4 * frames * rank + MOVING[part] * rank * (1 + 2 * splats);
+    },
+    HEAD_BYTES + (hasLives(version) ? 4 * splats : 0),
+  );
 }
+
+const hasLives = (version: MotionFile['version']): boolean => version === MOTION_VERSION.lives;
 
 class MotionReader {
   readonly #bytes: Uint8Array;
@@ -135,6 +156,7 @@ class MotionReader {
     const curves = MOVING_NAMES.map((_, k) => this.#curves(view, frames * rankAt(view, k)));
     const modes = this.#take(MOVING_NAMES.reduce((sum, part, k) => sum + MOVING[part] * rankAt(view, k), 0));
     budget.take(2 * splats * modes.length, this.#name);
+    const lives = hasLives(this.#asked.version) ? this.#lives() : undefined;
     let plane = 0;
     const parts = MOVING_NAMES.map((part, k): [MovingName, MovingPart] => {
       const rank = rankAt(view, k);
@@ -143,7 +165,21 @@ class MotionReader {
       const codes = Array.from({ length: MOVING[part] * rank }, () => this.#codes(modes[plane++]));
       return [part, { rank, step, curves: curves[k], codes }];
     });
-    return { splats, frames, parts: Object.fromEntries(parts) as Motion['parts'] };
+    return { splats, frames, parts: Object.fromEntries(parts) as Motion['parts'], ...(lives && { lives }) };
+  }
+
+  #lives(): Lives {
+    const { splats, frames, budget } = this.#asked;
+    budget.take(4 * splats, this.#name);
+    const [first, end] = [this.#words(), this.#words()];
+    if (first.every((begin, i) => begin < end[i] && end[i] <= frames)) return { first, end };
+    throw damaged(this.#name, `splats that live for one of ${grouped(frames)} frames or more`, 'others');
+  }
+
+  #words(): Uint16Array {
+    const { splats } = this.#asked;
+    const [low, high] = [this.#take(splats), this.#take(splats)];
+    return Uint16Array.from(low, (byte, i) => byte | (high[i] << 8));
   }
 
   #take(count: number): Uint8Array {
@@ -180,7 +216,7 @@ class MotionReader {
  */
 export function movedCloud(
   first: GaussianCloud,
-  { parts }: Motion,
+  { parts, lives }: Motion,
   frame: number,
   name: string,
   budget: LoadBudget,
@@ -222,9 +258,20 @@ export function movedCloud(
     eachNumber('rotation', add(turns, 3));
     turnBy(cloud.rotations, turns);
   }
+  if (lives) for (let i = 0; i < first.count; i++) if (!isAlive(lives, i, frame)) hide(cloud, first, i);
   const usable = keepUsable(cloud);
   if (usable.count > 0) return usable;
   throw noSplats(name, usable);
+}
+
+const isAlive = ({ first, end }: Lives, i: number, frame: number): boolean => frame >= first[i] && frame < end[i];
+
+/** Curves say nothing of splats that are not there: they stay where they were written, and are not seen. */
+function hide(cloud: GaussianCloud, first: GaussianCloud, i: number): void {
+  cloud.opacities[i] = 0;
+  cloud.positions.set(first.positions.subarray(3 * i, 3 * i + 3), 3 * i);
+  cloud.scales.set(first.scales.subarray(3 * i, 3 * i + 3), 3 * i);
+  cloud.rotations.set(first.rotations.subarray(4 * i, 4 * i + 4), 4 * i);
 }
 
 /** Turns quaternions further, about axes as long as the angles. */

@@ -17,6 +17,7 @@ const EVENTS = {
   onGeneratorFallback: 'generator-fallback',
   onPlay: 'play',
   onPlaying: 'playing',
+  onWaiting: 'waiting',
   onPause: 'pause',
   onTimeUpdate: 'timeupdate',
   onSeeking: 'seeking',

@@ -2,7 +2,7 @@ import { boundsOf, GaussianSplatError, type Bounds, type ShDegree, type Vector3 
 import type { GaussianLayout } from '@gaussian-splat/core/contract';
 import { pageCapacity } from './gaussian-buffers.js';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
-import { layouts } from './generated/shaders.js';
+import * as layouts from './generated/live-layouts.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';

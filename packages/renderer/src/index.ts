@@ -36,3 +36,4 @@ export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
 export type { Variants } from './variants.js';
 export { MemoryLedger } from './memory-ledger.js';
+export { ANIMATION_SLOTS, AnimatedGaussians, type AnimatedRoom } from './animated-gaussians.js';

@@ -49,3 +49,4 @@ export { ProjectStage } from './stages/project.js';
 export { sortedIn, SortStage, type SortBuffers } from './stages/sort.js';
 export { leafLevel, type SplatLevel } from './levels/splat-level.js';
 export { cameraValues } from './view.js';
+export { Ingest } from './generated/live-layouts.js';

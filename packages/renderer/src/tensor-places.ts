@@ -1,6 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AttributeSlice, GaussianAttribute, GaussianLayout } from '@gaussian-splat/core/contract';
-import { constants, type layouts } from './generated/shaders.js';
+import type * as layouts from './generated/live-layouts.js';
+import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE, type Resource } from './gpu/kernel.js';
 import type { GpuMemory } from './gpu/memory.js';
 import type { StructValues } from './gpu/struct.js';

@@ -69,3 +69,4 @@ export { sortByKey } from './pack/radix-sort.js';
 export { RankedHeap } from './ranked-heap.js';
 export { untilItHasRoom } from './until-it-has-room.js';
 export { faultsOf } from './variants.js';
+export { packAnimation, type Motions, type PackedAnimation } from './pack/pack-animated.js';

@@ -7,6 +7,7 @@ import {
   cullGroups,
   GpuMemory,
   IngestStage,
+  Ingest,
   layouts,
   pageCapacity,
   recentred,
@@ -121,10 +122,10 @@ function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: Gaus
 
 /** `Ingest` of rows that all live. */
 function uniformOf(memory: GpuMemory, degree: ShDegree, count: number): GPUBuffer {
-  const bytes = new ArrayBuffer(layouts.Ingest.size);
+  const bytes = new ArrayBuffer(Ingest.size);
   const { positions, scales, rotations, sh, opacities } = widthsOf(degree);
   writeStruct(
-    layouts.Ingest,
+    Ingest,
     {
       ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 0 },
       ...{ shape_kind: SHAPE_SCALE, shape_numbers: 3, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: degree },

@@ -147,7 +147,7 @@ async function findMotionSteps(
 }
 
 /** Median over the splats of their middle standard deviation. */
-function typicalSize({ scales, count }: GaussianCloud): number {
+export function typicalSize({ scales, count }: GaussianCloud): number {
   const middle = (i: number): number => [...scales.subarray(3 * i, 3 * i + 3)].sort((a, b) => a - b)[1];
   return Float64Array.from({ length: count }, (_, i) => middle(i)).sort()[count >> 1];
 }

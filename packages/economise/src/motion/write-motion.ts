@@ -1,6 +1,14 @@
 import { concatenated } from '../concatenated.js';
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import { MOTION_MODES, MOTION_VERSION, MOVING, MOVING_NAMES, type MovingName } from '@gaussian-splat/formats';
+import {
+  MOTION_MODES,
+  MOTION_VERSION,
+  MOVING,
+  MOVING_NAMES,
+  type Lives,
+  type MovingName,
+  type MovingPart,
+} from '@gaussian-splat/formats';
 import type { Deflate } from '../pages/page-planes.js';
 import type { Steps } from '../steps.js';
 import { mainCurves } from './main-curves.js';
@@ -21,11 +29,18 @@ const MOST_CODE = 32_767;
 /** An empty last block of a deflate stream. */
 const END = Uint8Array.of(3, 0);
 
-interface WrittenPart {
-  readonly rank: number;
-  readonly step: number;
-  readonly curves: Float32Array;
-  readonly codes: readonly Int16Array[];
+/** What one attribute does, as it is written. */
+export type WrittenPart = MovingPart;
+
+/** The curves that the numbers of an attribute follow most, the most followed first. */
+export interface Followed {
+  /** [width · splats] numbers that change. */
+  readonly rows: number;
+  readonly frames: number;
+  /** [frames] each. */
+  readonly curves: readonly Float64Array[];
+  /** [rows] of each curve: how much of it a number follows. */
+  readonly shares: readonly Float32Array[];
 }
 
 /**
@@ -42,11 +57,31 @@ export function writeMotion(
 ): Uint8Array<ArrayBuffer> {
   const other = frames.find(({ count }) => count !== first.count);
   if (other) throw notCorresponding(first.count, other.count);
-  const parts = MOVING_NAMES.map((name) =>
-    partOf(changesOf(first, frames, name), first.count, frames.length, steps[name]),
-  );
+  const parts = MOVING_NAMES.map((name): WrittenPart => {
+    const changes = changesOf(first, frames, name);
+    if (changes === undefined) return UNCHANGED;
+    return roundedPart(followed(changes, frames.length, leastCurve(steps[name])), steps[name], first.count);
+  });
+  return motionFile({ splats: first.count, frames: frames.length, parts, deflate });
+}
+
+/** A file of motion of what {@link MOVING_NAMES} do, in their order. */
+export function motionFile({
+  splats,
+  frames,
+  parts,
+  lives,
+  deflate,
+}: {
+  splats: number;
+  frames: number;
+  parts: readonly WrittenPart[];
+  lives?: Lives;
+  deflate: Deflate;
+}): Uint8Array<ArrayBuffer> {
+  const version = lives ? MOTION_VERSION.lives : MOTION_VERSION.everywhere;
   const head = new DataView(new ArrayBuffer(12 + 8 * parts.length));
-  [MOTION_VERSION, first.count, frames.length].forEach((number, k) => head.setUint32(4 * k, number, true));
+  [version, splats, frames].forEach((number, k) => head.setUint32(4 * k, number, true));
   parts.forEach(({ rank, step }, k) => {
     head.setUint32(12 + 8 * k, rank, true);
     head.setFloat32(16 + 8 * k, step, true);
@@ -56,8 +91,15 @@ export function writeMotion(
   const planes = parts.flatMap(({ codes }) => codes.map((own) => smaller(own, deflate)));
   const modes = Uint8Array.from(planes, ({ mode }) => mode);
   const begin = concatenated([bytesOf(head), bytesOf(curves), modes]);
-  return concatenated([deflate(begin), ...planes.map(({ bytes }) => bytes), END]);
+  const lifetimes = lives ? [lives.first, lives.end].flatMap((words) => halvesOf(words).map(deflate)) : [];
+  return concatenated([deflate(begin), ...lifetimes, ...planes.map(({ bytes }) => bytes), END]);
 }
+
+/** The low bytes of some words, and the high ones. */
+const halvesOf = (words: Uint16Array): readonly Uint8Array[] => [
+  Uint8Array.from(words, (word) => word & 255),
+  Uint8Array.from(words, (word) => word >> 8),
+];
 
 /** [width · splats, frames] what each number differs by from the first frame; undefined where all are as they were. */
 function changesOf(first: GaussianCloud, frames: readonly GaussianCloud[], name: MovingName): Float32Array | undefined {
@@ -120,7 +162,7 @@ function putTurns(
 }
 
 /** The quaternion that leads from one rotation to another. */
-function turnBetween(from: Float32Array, to: Float32Array, at: number, turn: Float64Array): void {
+export function turnBetween(from: Float32Array, to: Float32Array, at: number, turn: Float64Array): void {
   const [w, x, y, z] = [from[at], -from[at + 1], -from[at + 2], -from[at + 3]];
   const [a, b, c, d] = [to[at], to[at + 1], to[at + 2], to[at + 3]];
   turn[0] = a * w - b * x - c * y - d * z;
@@ -129,19 +171,38 @@ function turnBetween(from: Float32Array, to: Float32Array, at: number, turn: Flo
   turn[3] = a * z + b * y - c * x + d * w;
 }
 
-const UNCHANGED: WrittenPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
+export const UNCHANGED: WrittenPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
 
-/** Curves of an attribute, and how much of each the numbers of splats follow. */
-function partOf(changes: Float32Array | undefined, splats: number, frames: number, asked: number): WrittenPart {
-  if (changes === undefined) return UNCHANGED;
-  const rows = changes.length / frames;
-  const found = mainCurves(changes, frames, LEAST_CURVE * asked);
-  const follows = (row: number, curve: Float64Array): number => {
+/** Curves that splats follow by less than this, as a rule, are not worth a code at a step. */
+export const leastCurve = (step: number): number => LEAST_CURVE * step;
+
+/**
+ * @param changes [rows, frames]
+ * @param least see {@link leastCurve}
+ */
+export function followed(changes: Float32Array, frames: number, least: number): Followed {
+  const curves = mainCurves(changes, frames, least);
+  return { rows: changes.length / frames, frames, curves, shares: curves.map((curve) => sharesOf(changes, curve)) };
+}
+
+/** [rows] how much each row follows a curve. */
+export function sharesOf(changes: Float32Array, curve: Float64Array): Float32Array {
+  const frames = curve.length;
+  const shares = new Float32Array(changes.length / frames);
+  for (let row = 0, at = 0; row < shares.length; row++) {
     let sum = 0;
-    for (let f = 0; f < frames; f++) sum += changes[frames * row + f] * curve[f];
-    return sum / frames;
-  };
-  const shares = found.map((curve) => Float32Array.from({ length: rows }, (_, row) => follows(row, curve)));
+    for (let f = 0; f < frames; f++) sum += changes[at++] * curve[f];
+    shares[row] = sum / frames;
+  }
+  return shares;
+}
+
+/** The same with codes of a step, or of a larger one where codes would not fit; curves that nothing follows by then are left out. */
+export function roundedPart(
+  { rows, frames, curves: found, shares }: Followed,
+  asked: number,
+  splats: number,
+): WrittenPart {
   const most = shares.reduce((all, own) => own.reduce((largest, value) => Math.max(largest, Math.abs(value)), all), 0);
   const step = Math.fround(Math.max(asked, most / MOST_CODE));
   const codes = shares.map((own) =>
@@ -149,6 +210,7 @@ function partOf(changes: Float32Array | undefined, splats: number, frames: numbe
   );
   const kept = codes.map((own, k) => ({ own, k })).filter(({ own }) => own.some((code) => code !== 0));
   const rank = kept.length;
+  if (rank === 0) return UNCHANGED;
   const curves = new Float32Array(frames * rank);
   kept.forEach(({ k }, at) => found[k].forEach((value, f) => (curves[rank * f + at] = value)));
   const width = rows / splats;

@@ -6,7 +6,7 @@ import {
   constants,
   GpuMemory,
   IngestStage,
-  layouts as rendererLayouts,
+  Ingest,
   pageCapacity,
   recentred,
   withMemoryCheck,
@@ -192,10 +192,10 @@ export class RefinedScene implements GaussianScene {
 
   /** `Ingest` of rows of numbers. */
   #ingestOf(count: number): ArrayBuffer {
-    const bytes = new ArrayBuffer(rendererLayouts.Ingest.size);
+    const bytes = new ArrayBuffer(Ingest.size);
     const width = this.#width;
     writeStruct(
-      rendererLayouts.Ingest,
+      Ingest,
       {
         ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 1 },
         ...{

@@ -4,6 +4,7 @@ import type { Attributes } from '../attributes.js';
 export type PlaybackEvent =
   | 'play'
   | 'playing'
+  | 'waiting'
   | 'pause'
   | 'timeupdate'
   | 'seeking'
@@ -118,7 +119,7 @@ export class PlaybackController {
   }
 
   set playbackRate(rate: number) {
-    if (!Number.isFinite(rate)) throw new TypeError(`playbackRate expects a finite number, found ${rate}`);
+    requireFinite(rate, 'playbackRate');
     if (rate === this.#rate) return;
     // While it stood there were no ticks.
     if (this.#rate === 0) this.suspend();
@@ -183,9 +184,17 @@ export class PlaybackController {
     this.#host.requestFrame();
   }
 
-  /** Moves on to the moment of a frame. @param now requestAnimationFrame's clock, ms */
-  tick(now: number): void {
+  /**
+   * Moves on to the moment of a frame.
+   * @param now requestAnimationFrame's clock, ms
+   * @param isLacking what the time shows is not there: it stands until it is
+   */
+  tick(now: number, isLacking = false): void {
     if (this.#isPaused || Number.isNaN(this.#duration)) return;
+    if (isLacking) {
+      if (this.#lastTick !== undefined) this.#host.playbackEvent('waiting');
+      return this.suspend();
+    }
     if (this.#lastTick === undefined) this.#host.playbackEvent('playing');
     const elapsed = this.#lastTick === undefined ? 0 : (now - this.#lastTick) / 1000;
     this.#lastTick = now;
@@ -245,9 +254,8 @@ export class PlaybackController {
   }
 }
 
-function requireFinite(seconds: number): void {
-  if (!Number.isFinite(seconds))
-    throw new TypeError(`currentTime expects a finite number of seconds, found ${seconds}`);
+function requireFinite(value: number, name = 'currentTime'): void {
+  if (!Number.isFinite(value)) throw new TypeError(`${name} expects a finite number, found ${value}`);
 }
 
 /** Why a scene that was to be played is not. */

@@ -99,8 +99,14 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
 /** Generators are known by the name of the file, or by the contract that the page gives along. */
 export function isGenerator({ url, contract }: SceneRequest): boolean {
   if (contract !== undefined && contract !== null && contract !== '') return true;
-  const { pathname, protocol, hash } = URL.canParse(url) ? new URL(url) : { pathname: url, protocol: '', hash: '' };
-  return /\.onnx$/i.test(protocol === 'blob:' ? hash : pathname);
+  return /\.onnx$/i.test(nameIn(url));
+}
+
+/** What tells a kind: the path of an address, or the name that a page gives a file behind it. */
+function nameIn(url: string): string {
+  if (!URL.canParse(url)) return url;
+  const { pathname, protocol, hash } = new URL(url);
+  return protocol === 'blob:' ? hash : pathname;
 }
 
 async function openSequence(
@@ -134,11 +140,11 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /**
- * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, which may be wanted whole.
+ * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, a clip by its extension, and so is streamed SOG, which may be wanted whole.
  */
 export function isStreamed({ url, isWhole }: SceneRequest): boolean {
-  const name = URL.canParse(url) && /(^|\/)(detail|lod-meta)\.json$/.exec(new URL(url).pathname)?.[2];
-  return name === 'detail' || (!!name && !isWhole);
+  const name = /(^|\/)(detail|lod-meta)\.json$|\.gsv$/i.exec(nameIn(url));
+  return name !== null && !(isWhole && name[2] === 'lod-meta');
 }
 
 async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
@@ -156,14 +162,10 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     const onChange = (): void => scene?.onChange();
     // How much of it fits is decided when its manifest is there.
     beforeUpload(memoryBudget ?? 0);
-    const { gaussians, detail, warnings } = await openStreamed(request, lease.device, {
-      ...{ loader, signal, onProgress, memoryBudget, onChange },
+    const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
+      ...{ loader, signal, onProgress, memoryBudget, onChange, live: options.live },
     });
-    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, {
-      detail,
-      order: gaussians.order,
-      warnings,
-    });
+    scene = new LoadedGaussians(lease, gaussians, bounds, submissions, rest);
     return scene;
   } catch (error) {
     lease.release();

@@ -1,9 +1,14 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
 import { partRequest } from '@gaussian-splat/core/fetch';
+import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
-import type { ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
+import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { Here, SceneLoader } from '../loading/scene-loader.js';
+import type { ClipPlayer } from '../live/clip-player.js';
+import type { LiveRequest } from '../live/live-model.js';
+import type { SceneBounds } from '../camera/settings.js';
+import type { OwnedGaussians } from './loaded-gaussians.js';
 import type { DetailLevers } from './painter.js';
 import { streamCaps } from './stream-caps.js';
 
@@ -15,6 +20,18 @@ export interface StreamedOptions {
   readonly memoryBudget: number | undefined;
   /** Called when another frame is asked for. */
   readonly onChange: () => void;
+  /** What a clip needs to know. */
+  readonly live: () => Pick<LiveRequest, 'listeners' | 'loops' | 'state'>;
+}
+
+/** What comes in parts. */
+export interface OpenedStream {
+  readonly gaussians: OwnedGaussians;
+  readonly bounds: SceneBounds;
+  readonly order?: 'pixel' | undefined;
+  readonly detail?: DetailLevers;
+  readonly live?: ClipPlayer;
+  readonly warnings?: readonly string[];
 }
 
 /** Of the memory that all scenes of the page have left: another one may come. */
@@ -32,7 +49,8 @@ export async function openStreamed(
   request: SceneRequest,
   device: GPUDevice,
   options: StreamedOptions,
-): Promise<{ gaussians: StreamedGaussians; detail: DetailLevers; warnings: readonly string[] }> {
+): Promise<OpenedStream> {
+  if (!new URL(request.url).pathname.endsWith('.json')) return openClip(request, device, options);
   const { signal, memoryBudget = Infinity, onChange } = options;
   const caps = streamCaps();
   const warnings: string[] = [];
@@ -54,9 +72,20 @@ export async function openStreamed(
   };
   const isSog = new URL(request.url).pathname.endsWith('lod-meta.json');
   const gaussians = await (isSog ? openBoxes : openPages)(request, device, options, pool);
-  if (!signal.aborted) return { gaussians, detail: { detail: DETAIL, splatBudget: caps.splats }, warnings };
+  const { bounds, order } = gaussians;
+  if (!signal.aborted)
+    return { ...{ gaussians, bounds, order, warnings }, detail: { detail: DETAIL, splatBudget: caps.splats } };
   gaussians.destroy();
   throw signal.reason;
+}
+
+async function openClip(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
+  const { ClipPlayer } = await loadModule('the code that plays clips', () => import('../live/clip-player.js'));
+  const { listeners, loops, state } = options.live();
+  const startSeconds = state().timeSeconds;
+  const player = await ClipPlayer.open({ ...options, request, device, listeners, loops, startSeconds });
+  const { gaussians, bounds } = player;
+  return { gaussians, bounds, live: player };
 }
 
 /** What one scene may fetch: the limits count for all of its parts together, each once however often it comes and goes. */
@@ -114,7 +143,7 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
   const { levels, files, runs, firstRuns } = await loader.ask(
     { type: 'boxes', request },
     signal,
-    ({ openBoxes }) => openBoxes(request, signal, onProgress),
+    ({ openBoxes }) => openBoxes(request, signal, onProgress) as Promise<LoadedBoxes>,
     { onProgress },
   );
   const { url, credentials } = request;

@@ -41,6 +41,10 @@ export interface Timeline {
   readonly settable?: readonly string[];
   /** Asks for the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
   request(state: LiveState, camera: Camera): void;
+  /** Where nothing can be shown yet that the time asks for, the clock waits; absent where it never does. */
+  isLacking?(timeSeconds: number): boolean;
+  /** [start, end] of the times that need no more bytes, seconds; absent for all. */
+  readonly buffered?: readonly (readonly [start: number, end: number])[];
   close(): void;
 }
 

@@ -112,7 +112,8 @@ export class LiveWiring implements PostHost {
   /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
   advance({ live }: LoadedGaussians, camera: Camera, now: number): void {
     if (live === undefined) return;
-    this.#host.playback.tick(now);
+    const { playback } = this.#host;
+    playback.tick(now, live.isLacking?.(playback.currentTime));
     try {
       live.request(this.state, camera);
     } catch (error) {

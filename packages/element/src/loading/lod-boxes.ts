@@ -9,10 +9,11 @@ import {
   type FetchSceneOptions,
   type LodScene,
 } from '@gaussian-splat/formats';
+import { loadModule } from '@gaussian-splat/core';
 import { layOutLevels, packLevelPage } from '@gaussian-splat/renderer/tools';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
-import type { BoxRequest, LoadedBoxes, ProgressListener, SceneRequest } from './protocol.js';
+import type { BoxRequest, ClipAnswer, ClipRequest, LoadedBoxes, ProgressListener, SceneRequest } from './protocol.js';
 
 /** Of all such scenes of the page. */
 const files = new SogFiles();
@@ -34,10 +35,15 @@ function accountOf(url: string): LoadBudget {
  * the signal's reason once that is aborted.
  */
 export async function openBoxes(
-  request: SceneRequest,
+  request: SceneRequest | ClipRequest,
   signal: AbortSignal,
   onProgress: ProgressListener,
-): Promise<LoadedBoxes> {
+): Promise<LoadedBoxes | ClipAnswer<unknown>> {
+  if ('isClip' in request) {
+    const { readClip } = await loadModule('the code that reads clips', () => import('./clip-of.js'));
+    const clip = await readClip(request, signal);
+    return { clip, levels: clip };
+  }
   const { url, credentials, sh } = request;
   const name = fileName(url);
   const limits = limitsFrom(request);

@@ -1,11 +1,11 @@
 /** What the page and the scene worker say to each other. */
-import type { ErrorData } from '@gaussian-splat/core';
+import type { ErrorData, Vector3 } from '@gaussian-splat/core';
 import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { FloorOptions } from '@gaussian-splat/formats/walk';
-import type { LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
+import type { ClipPart, LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
 import type { PackedGaussians, StreamedScene } from '@gaussian-splat/renderer';
 import type { CodedFile, LevelPage, LevelScene, ShPrecision } from '@gaussian-splat/renderer/tools';
 
@@ -87,6 +87,22 @@ export interface MovedFrameRequest {
   readonly limits?: SceneLimits | undefined;
 }
 
+/** The index of a clip, or a part of one of its groups: asked for as `boxes`, since both come by byte ranges. */
+export interface ClipRequest extends FileRequest {
+  readonly isClip: true;
+  /** The whole file, where the page has it. */
+  readonly whole?: Blob | undefined;
+  /** Absent for the index. */
+  readonly part?: { readonly part: ClipPart; readonly frames: number; readonly origin: Vector3 };
+}
+
+/** What comes of a {@link ClipRequest}. */
+export interface ClipAnswer<T> {
+  readonly clip: T;
+  /** Its buffers change threads. */
+  readonly levels: object;
+}
+
 /** A streamed SOG scene of which the coarsest levels are there. */
 export interface LoadedBoxes {
   readonly levels: LevelScene;
@@ -132,7 +148,7 @@ export type WorkerRequest =
   | { readonly type: 'file'; readonly request: FileRequest }
   | { readonly type: 'manifest'; readonly request: FileRequest }
   | { readonly type: 'mesh'; readonly request: FileRequest }
-  | { readonly type: 'boxes'; readonly request: SceneRequest }
+  | { readonly type: 'boxes'; readonly request: SceneRequest | ClipRequest }
   | { readonly type: 'box'; readonly request: BoxRequest }
   | { readonly type: 'frame'; readonly request: MovedFrameRequest }
   | { readonly type: 'floor'; readonly request: FloorRequest }

@@ -9,6 +9,8 @@ import type { DetailManifest } from '@gaussian-splat/renderer';
 import {
   buffersOf,
   type BoxRequest,
+  type ClipAnswer,
+  type ClipRequest,
   type FileRequest,
   type FloorRequest,
   type LoadedBoxes,
@@ -47,10 +49,10 @@ const loadBoxCode = (): Promise<typeof boxes> =>
   loadModule('the code that streams SOG', () => import('./lod-boxes.js'));
 
 export const openBoxes = async (
-  request: SceneRequest,
+  request: SceneRequest | ClipRequest,
   signal: AbortSignal,
   onProgress: ProgressListener,
-): Promise<LoadedBoxes> => (await loadBoxCode()).openBoxes(request, signal, onProgress);
+): Promise<LoadedBoxes | ClipAnswer<unknown>> => (await loadBoxCode()).openBoxes(request, signal, onProgress);
 
 export const readBox = async (request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> =>
   (await loadBoxCode()).readBox(request, signal);

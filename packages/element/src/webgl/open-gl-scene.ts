@@ -37,6 +37,8 @@ export async function openGlScene(
   try {
     requireAlone();
     if (isGenerator(request) || request.chain?.length) throw cannotShow('a generator', reason);
+    if (streamBytes !== undefined && !new URL(request.url).pathname.endsWith('.json'))
+      throw cannotShow('a clip', reason);
     if (!live().ownsControls()) throw cannotShow('a post-processor', reason);
     const previews = new Previews(options);
     const scene = await loader

@@ -1,5 +1,5 @@
 import { present, tensorToImage } from '../generated/live-shaders.js';
-import { layouts } from '../generated/shaders.js';
+import * as layouts from '../generated/live-layouts.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { FullScreenStage } from '../stages/full-screen.js';

@@ -1,6 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { imageToTensor } from '../generated/live-shaders.js';
-import { constants, layouts } from '../generated/shaders.js';
+import * as layouts from '../generated/live-layouts.js';
+import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';

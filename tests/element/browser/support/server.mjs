@@ -234,6 +234,25 @@ const ANSWERS = {
     context.body = Buffer.from(await motionOf(1 + 4 * file, Math.min(4, Number(count) - 1 - 4 * file)));
   },
 
+  /**
+   * A clip of one ball that changes its colour and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer comes so many milliseconds later;
+   * `lost`: a group that is not there.
+   */
+  async clip(context) {
+    const { frames = '12', whole, slow = '0', lost } = context.query;
+    const { bytes, starts } = await clipOf(Number(frames));
+    const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(context.get('Range')) ?? [];
+    if (slow !== '0' && Number(first) > 0) await new Promise((resolve) => setTimeout(resolve, Number(slow)));
+    if (lost && Number(first) >= starts[Number(lost)] && !(Number(first) >= starts[Number(lost) + 1]))
+      return void (context.status = 404);
+    context.set('Cache-Control', 'no-store');
+    if (first === undefined || whole !== undefined) return void (context.body = Buffer.from(bytes));
+    const end = Math.min(bytes.length, Number(last) + 1);
+    context.status = 206;
+    context.set('Content-Range', `bytes ${first}-${end - 1}/${bytes.length}`);
+    context.body = Buffer.from(bytes.subarray(Number(first), end));
+  },
+
   /** A sequence of two frames for whoever has a token, red, or a signature, blue; for nobody else. */
   signed(context, name) {
     const colour = { 'token=a': COLOURS[0], 'signed=b': COLOURS[2] }[context.querystring];
@@ -532,6 +551,44 @@ async function motionOf(begin, count) {
   const deflate = (bytes) => deflateRawSync(bytes, { finishFlush: constants.Z_SYNC_FLUSH });
   const steps = { position: 1e-3, rotation: 1e-2, scale: 1e-2, opacity: 1e-2, color: 1e-2 };
   return writeMotion(first, frames, { steps, deflate });
+}
+
+const clips = new Map();
+
+/** The clip of so many frames, and the first byte of each of its groups. */
+async function clipOf(frameCount) {
+  const made = clips.get(frameCount) ?? makeClip(frameCount);
+  clips.set(frameCount, made);
+  return made;
+}
+
+async function makeClip(frameCount) {
+  const { codeClip, encodingsFor } = await import('@gaussian-splat/economise');
+  const { readScene, parseClip } = await import('@gaussian-splat/formats');
+  const first = await readScene(ball(200, COLOURS[0]), { name: 'ball.splat' });
+  const frameOf = (frame) => {
+    const color = COLOURS[frame % 3].map((value) => (value / 255 - 0.5) / 0.28209479177387814);
+    const count = 200 - (frame % 2);
+    return {
+      ...first,
+      count,
+      positions: first.positions.slice(0, 3 * count).map((value, i) => value + (i % 3 === 0 ? 0.02 * (frame % 12) : 0)),
+      scales: first.scales.slice(0, 3 * count),
+      rotations: first.rotations.slice(0, 4 * count),
+      opacities: first.opacities.slice(0, count),
+      sh: first.sh.slice(0, 3 * count).map((_, i) => color[i % 3]),
+    };
+  };
+  const { bytes } = await codeClip({
+    ...{ frameCount, framesPerSecond: 10, framesPerGroup: 4, minDecibels: 45 },
+    openFrame: async (frame) => frameOf(frame),
+    deflate: (data) => deflateRawSync(data, { finishFlush: constants.Z_SYNC_FLUSH }),
+    rounding: {
+      encoding: encodingsFor('a.ply')[0],
+      steps: { position: 1e-3, rotation: 1e-2, scale: 1e-2, opacity: 1e-2, color: 1e-2 },
+    },
+  });
+  return { bytes, starts: parseClip(bytes, 'a.gsv').groups.map(({ parts }) => parts[0].start) };
 }
 
 /** A PLY's header, and rows that it repeats. */

@@ -1,0 +1,162 @@
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  MOVING,
+  MOVING_NAMES,
+  readScene,
+  type ClipPartContent,
+  type Lives,
+  type MovingName,
+} from '@gaussian-splat/formats';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
+import { concatenated } from '../concatenated.js';
+import {
+  leastCurve,
+  motionFile,
+  roundedPart,
+  UNCHANGED,
+  type Followed,
+  type MotionSteps,
+} from '../motion/write-motion.js';
+import type { Deflate } from '../pages/page-planes.js';
+import { splatsOf } from '../reduce.js';
+import type { Encoding } from '../write/index.js';
+import { followedWithin } from './partial-curves.js';
+import { changesOfTracks } from './track-changes.js';
+import type { Tracks } from './tracks.js';
+
+/** A part of a group as it lies in the file. */
+export interface WrittenClipPart {
+  readonly splats: number;
+  readonly planes: number;
+  readonly sceneBytes: number;
+  readonly motionBytes: number;
+  readonly bytes: Uint8Array<ArrayBuffer>;
+}
+
+/** Some tracks of a group: their splats as a scene, and the curves that these follow, to be rounded as coarsely as is asked. */
+export class TrackedPart {
+  readonly #scene: Uint8Array;
+  readonly #cloud: GaussianCloud;
+  readonly #lives: Lives;
+  readonly #frames: number;
+  readonly #followed: Readonly<Record<MovingName, Followed | undefined>>;
+
+  private constructor(
+    scene: Uint8Array,
+    cloud: GaussianCloud,
+    lives: Lives,
+    frames: number,
+    found: Readonly<Record<MovingName, Followed | undefined>>,
+  ) {
+    this.#scene = scene;
+    this.#cloud = cloud;
+    this.#lives = lives;
+    this.#frames = frames;
+    this.#followed = found;
+  }
+
+  /**
+   * @param whole the splats of all tracks
+   * @param chosen the tracks of this part
+   * @param encoding how their scene is written
+   * @param finest steps below which motion will not be rounded
+   */
+  static async of(
+    tracks: Tracks,
+    whole: GaussianCloud,
+    chosen: Uint32Array,
+    encoding: Encoding,
+    finest: MotionSteps,
+  ): Promise<TrackedPart> {
+    const given = splatsOf(whole, chosen);
+    const scene = new Uint8Array(
+      await encoding.write({ cloud: given, degrees: new Uint8Array(given.count).fill(given.shDegree) }),
+    );
+    const cloud = await readScene(scene, { name: 'a group of frames' });
+    if (cloud.count !== given.count) throw notWritten(given.count, cloud.count);
+    const order = orderIn(cloud, given);
+    const source = splatsOf(given, order);
+    const placeOf = new Int32Array(tracks.count).fill(-1);
+    order.forEach((i, place) => (placeOf[chosen[i]] = place));
+    const livesOf = (own: Uint16Array): Uint16Array => Uint16Array.from(order, (i) => own[chosen[i]]);
+    const lives = { first: livesOf(tracks.lives.first), end: livesOf(tracks.lives.end) };
+    const frames = tracks.frames.length;
+    // To what was written: what does not move has no motion, and what rounding makes of it is in the scene's share of the error.
+    const find = (name: MovingName): Followed | undefined => {
+      const changes = changesOfTracks(tracks, { cloud: source, placeOf }, name);
+      const span = (row: number): readonly [number, number] => [
+        lives.first[row % cloud.count],
+        lives.end[row % cloud.count],
+      ];
+      return changes && followedWithin(changes, frames, span, leastCurve(finest[name]));
+    };
+    const found = Object.fromEntries(MOVING_NAMES.map((name) => [name, find(name)]));
+    return new TrackedPart(scene, cloud, lives, frames, found as Record<MovingName, Followed | undefined>);
+  }
+
+  /** What is read of it where motion is rounded so. */
+  contentAt(steps: MotionSteps): ClipPartContent {
+    const parts = Object.fromEntries(
+      MOVING_NAMES.map((name) => {
+        const own = this.#followed[name];
+        return [
+          name,
+          own ? roundedPart(strongest(own, leastCurve(steps[name])), steps[name], this.#cloud.count) : UNCHANGED,
+        ];
+      }),
+    ) as ClipPartContent['motion']['parts'];
+    return {
+      cloud: this.#cloud,
+      motion: { splats: this.#cloud.count, frames: this.#frames, parts, lives: this.#lives },
+    };
+  }
+
+  write(steps: MotionSteps, deflate: Deflate): WrittenClipPart {
+    const { parts } = this.contentAt(steps).motion;
+    const motion = motionFile({
+      ...{ splats: this.#cloud.count, frames: this.#frames, lives: this.#lives, deflate },
+      parts: MOVING_NAMES.map((name) => parts[name]),
+    });
+    return {
+      splats: this.#cloud.count,
+      planes: MOVING_NAMES.reduce((sum, name) => sum + MOVING[name] * parts[name].rank, 0),
+      sceneBytes: this.#scene.length,
+      motionBytes: motion.length,
+      bytes: concatenated([this.#scene, motion]),
+    };
+  }
+}
+
+/** Numbers of the splats that a file has, in its order: formats keep the order that they get, or sort splats as packing does. */
+function orderIn(read: GaussianCloud, given: GaussianCloud): Uint32Array {
+  const orders = [Uint32Array.from({ length: given.count }, (_, i) => i), packedOrder(given)];
+  const apart = orders.map((order) => {
+    let sum = 0;
+    for (let k = 0; k < 3 * order.length; k++)
+      sum += Math.abs(read.positions[k] - given.positions[3 * order[Math.floor(k / 3)] + (k % 3)]);
+    return sum;
+  });
+  return orders[apart[0] <= apart[1] ? 0 : 1];
+}
+
+/** Without the curves that are followed by less, as a rule. */
+function strongest({ rows, frames, curves, shares }: Followed, least: number): Followed {
+  const isStrong = shares.map((own) => {
+    let sum = 0;
+    for (let row = 0; row < own.length; row++) sum += own[row] * own[row];
+    return sum / own.length > least * least;
+  });
+  return {
+    ...{ rows, frames },
+    curves: curves.filter((_, k) => isStrong[k]),
+    shares: shares.filter((_, k) => isStrong[k]),
+  };
+}
+
+const notWritten = (expected: number, found: number): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'frames of a sequence',
+    expected: `${expected} splats that a scene file keeps`,
+    found: `${found}`,
+    remedy: 'report it, with the scene files',
+  });

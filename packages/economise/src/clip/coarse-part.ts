@@ -1,0 +1,27 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { packedOrder } from '@gaussian-splat/renderer/tools';
+import type { Tracks } from './tracks.js';
+
+/** Splats of which one is in the coarse part: neighbours, so that no place is left out. */
+export const COARSE_RUN = 8;
+
+/**
+ * Divides tracks in two: those that give a coarse image alone, and all others.
+ * @param cloud their splats
+ */
+export function coarseAndRest(cloud: GaussianCloud, { lives, frames }: Tracks): readonly Uint32Array[] {
+  const order = packedOrder(cloud);
+  const weightOf = (i: number): number => {
+    const [a, b, c] = cloud.scales.subarray(3 * i, 3 * i + 3);
+    return (cloud.opacities[i] * Math.max(a * b, b * c, c * a) * (lives.end[i] - lives.first[i])) / frames.length;
+  };
+  const coarse: number[] = [];
+  const rest: number[] = [];
+  for (let at = 0; at < order.length; at += COARSE_RUN) {
+    const run = [...order.subarray(at, at + COARSE_RUN)];
+    const weights = run.map(weightOf);
+    const best = weights.indexOf(Math.max(...weights));
+    run.forEach((i, k) => (k === best ? coarse : rest).push(i));
+  }
+  return [coarse, rest].filter(({ length }) => length > 0).map((own) => Uint32Array.from(own));
+}

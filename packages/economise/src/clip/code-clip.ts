@@ -1,0 +1,302 @@
+import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  clipFrame,
+  LoadBudget,
+  MOVING,
+  MOVING_NAMES,
+  readScene,
+  writeClipHead,
+  type ClipHead,
+  type ClipPartContent,
+  type MovingName,
+} from '@gaussian-splat/formats';
+import { concatenated } from '../concatenated.js';
+import { GpuEvaluator } from '../gpu/gpu-evaluator.js';
+import { decibels, mean, meanSquareOf } from '../measure.js';
+import { typicalSize, type CodeSequenceOptions } from '../motion/code-sequence.js';
+import type { MotionSteps } from '../motion/write-motion.js';
+import { findSteps, scaledSteps, type Steps } from '../steps.js';
+import { viewsAround } from '../views.js';
+import type { Encoding } from '../write/index.js';
+import { tuneSog } from '../write/tune-sog.js';
+import { TrackedPart, type WrittenClipPart } from './clip-part.js';
+import { coarseAndRest } from './coarse-part.js';
+import { cloudOfTracks, followSplats, type Tracks } from './tracks.js';
+
+export interface CodeClipOptions extends Omit<CodeSequenceOptions, 'openFrame' | 'framesPerFile'> {
+  /** Reads a frame; frames need not have the same splats. */
+  readonly openFrame: (frame: number) => Promise<GaussianCloud>;
+  readonly framesPerSecond: number;
+  readonly framesPerGroup: number;
+  /** Megabits that a second takes at most, in any group; `worstDecibels` of the result says what that costs. Default: no limit. */
+  readonly maxMbps?: number;
+  /** Rounding that is known, in place of one that is found by measurement: then there is no need of a device, and nothing is measured. */
+  readonly rounding?: { readonly encoding: Encoding; readonly steps: MotionSteps };
+}
+
+export interface CodedClip {
+  readonly bytes: Uint8Array<ArrayBuffer>;
+  /** Bytes until the first frame can be shown. */
+  readonly firstBytes: number;
+  readonly groups: number;
+  /** Splats of all groups, and those that some frames of their groups lack. */
+  readonly splats: number;
+  readonly passing: number;
+  /** PSNR of all measured frames together, and of the worst view of them. */
+  readonly decibels: number;
+  readonly worstDecibels: number;
+}
+
+/** Share of the error that scenes of groups make; motion adds the rest. */
+const SCENE_SHARE = 0.4;
+const MAX_TRIES = 5;
+const NEAR_ENOUGH = 0.85;
+/** Steps of motion may become so much finer than those that the first group has. */
+const FINER = 16;
+/** Frames of a group that are measured, and views of each. */
+const JUDGED = [0.2, 0.75];
+const VIEWS = 2;
+const GROWTHS = [1, 1.25, 1.6, 2, 2.5];
+
+/** Codes frames of any splats as a clip. Rounding is as coarse as images of some frames, in held-out views, allow. */
+export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
+  const coder = new ClipCoder(options);
+  const { frameCount, framesPerGroup } = options;
+  for (let begin = 0; begin < frameCount; begin += framesPerGroup)
+    await coder.add(begin, Math.min(frameCount, begin + framesPerGroup));
+  return coder.finish();
+}
+
+/** What a group became, and the errors that it was found to have. */
+interface WrittenGroup {
+  readonly frames: number;
+  readonly parts: readonly WrittenClipPart[];
+  readonly errors: readonly number[];
+}
+
+class ClipCoder {
+  readonly #options: CodeClipOptions;
+  readonly #target: number;
+  readonly #groups: WrittenGroup[] = [];
+  #facts: Omit<ClipHead, 'groups' | 'grow' | 'framesPerSecond'> | undefined;
+  #encoding: Encoding | undefined;
+  #steps: MotionSteps | undefined;
+  #grow = 1;
+  #largest = 0;
+  #splats = 0;
+  #passing = 0;
+
+  constructor(options: CodeClipOptions) {
+    this.#options = options;
+    this.#target = meanSquareOf(options.minDecibels);
+  }
+
+  async add(begin: number, end: number): Promise<void> {
+    const { openFrame, onStep = () => undefined } = this.#options;
+    const sources: GaussianCloud[] = [];
+    for (let frame = begin; frame < end; frame++) sources.push(await openFrame(frame));
+    requireOneDegree(sources, this.#facts?.shDegree);
+    const tracks = followSplats(sources);
+    const whole = cloudOfTracks(tracks);
+    const passing = tracks.lives.first.filter((first, i) => first > 0 || tracks.lives.end[i] < end - begin).length;
+    this.#splats += tracks.count;
+    this.#passing += passing;
+    this.#note(sources[0], whole);
+    onStep(`frames ${begin} to ${end - 1}: ${tracks.count} splats, ${passing} of them in some frames only`);
+    const chosen = coarseAndRest(whole, tracks);
+    const { rounding } = this.#options;
+    if (rounding) return void this.#groups.push(await this.#roundAs(rounding, tracks, whole, chosen));
+    this.#encoding ??= await this.#tune(tracks.frames[Math.floor(JUDGED[0] * tracks.frames.length)]);
+    const group = await this.#code(tracks, whole, chosen);
+    this.#groups.push(group);
+    const bytes = bytesOf(group);
+    const worst = decibels(Math.max(...group.errors)).toFixed(2);
+    onStep(`  ${bytes} bytes, ${group.parts[0].bytes.length} of them coarse; ${worst} dB in the worst view`);
+  }
+
+  async #roundAs(
+    { encoding, steps }: NonNullable<CodeClipOptions['rounding']>,
+    tracks: Tracks,
+    whole: GaussianCloud,
+    chosen: readonly Uint32Array[],
+  ): Promise<WrittenGroup> {
+    const parts: WrittenClipPart[] = [];
+    for (const own of chosen)
+      parts.push((await TrackedPart.of(tracks, whole, own, encoding, steps)).write(steps, this.#options.deflate));
+    return { frames: tracks.frames.length, parts, errors: [] };
+  }
+
+  finish(): CodedClip {
+    const { framesPerSecond } = this.#options;
+    const groups = this.#groups;
+    const head = writeClipHead({ ...this.#facts!, framesPerSecond, grow: this.#grow, groups });
+    const bytes = concatenated([head, ...groups.flatMap(({ parts }) => parts.map((part) => part.bytes))]);
+    const errors = groups.flatMap((group) => group.errors);
+    return {
+      bytes,
+      firstBytes: head.length + groups[0].parts[0].bytes.length,
+      ...{ groups: groups.length, splats: this.#splats, passing: this.#passing },
+      decibels: errors.length > 0 ? decibels(mean(errors)) : NaN,
+      worstDecibels: errors.length > 0 ? decibels(Math.max(...errors)) : NaN,
+    };
+  }
+
+  /** The camera sees where splats are in the group that has most of them. */
+  #note(frame: GaussianCloud, whole: GaussianCloud): void {
+    if (whole.count <= this.#largest) return;
+    this.#largest = whole.count;
+    const { shDegree, antialiased, filterVariance } = frame;
+    const { origin } = this.#facts ?? frame;
+    this.#facts = {
+      shDegree,
+      origin,
+      antialiased,
+      filterVariance,
+      bounds: { ...boundsOf(whole), up: frame.hints?.up },
+    };
+  }
+
+  /** Steps of scenes, by a frame of the first group. */
+  async #tune(cloud: GaussianCloud): Promise<Encoding> {
+    const { device, encodeWebp, onStep = () => undefined } = this.#options;
+    const judge = await judgeOf(device, cloud, 3, 1);
+    const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
+    const measure = async (bytes: Uint8Array): Promise<number> =>
+      Math.max(...(await judge.compare(await readScene(bytes, { name: 'a group of frames' }), 'heldOut')));
+    const encoding = await tuneSog(encodeWebp).tune!(whole, measure, SCENE_SHARE * this.#target);
+    judge.destroy();
+    onStep(`scenes of groups: ${encoding.title}`);
+    return encoding;
+  }
+
+  async #code(tracks: Tracks, whole: GaussianCloud, chosen: readonly Uint32Array[]): Promise<WrittenGroup> {
+    const { device, deflate, maxMbps = Infinity, framesPerSecond } = this.#options;
+    const frames = tracks.frames.length;
+    const most = (maxMbps * 1e6 * frames) / (8 * framesPerSecond);
+    const judges = await judgesOf(device, tracks.frames);
+    let encoding = this.#encoding!;
+    let finest = this.#steps ?? usualSteps(whole);
+    let steps = this.#steps;
+    try {
+      for (let tries = 1; ; tries++) {
+        const parts: TrackedPart[] = [];
+        for (const own of chosen)
+          parts.push(await TrackedPart.of(tracks, whole, own, encoding, scaledSteps(finest, 1 / FINER)));
+        steps ??= await this.#findSteps(parts, tracks, judges);
+        const contents = parts.map((part) => part.contentAt(steps!));
+        const errors = await errorsIn(judges, contents);
+        if (this.#groups.length === 0) this.#grow = await growthIn(judges[0], contents);
+        const worst = Math.max(...errors);
+        const group = { frames, errors, parts: parts.map((part) => part.write(steps!, deflate)) };
+        const isTooLarge = bytesOf(group) > most;
+        this.#steps = steps;
+        if ((!isTooLarge && worst <= this.#target) || (!isTooLarge && most < Infinity) || tries === MAX_TRIES)
+          return group;
+        const factor = isTooLarge
+          ? Math.min(3, (bytesOf(group) / most) ** 1.5)
+          : Math.max(0.5, 0.93 * Math.sqrt(this.#target / worst));
+        steps = scaledSteps(steps, factor);
+        finest = steps;
+        encoding = encoding.coarser!(factor);
+      }
+    } finally {
+      for (const { judge } of judges) judge.destroy();
+    }
+  }
+
+  /** Steps at which a frame of the first group reaches the target, and a byte saves the same error in all attributes. */
+  async #findSteps(
+    parts: readonly TrackedPart[],
+    { frames }: Tracks,
+    judges: readonly FrameJudge[],
+  ): Promise<MotionSteps> {
+    const { onStep = () => undefined } = this.#options;
+    const last = judges.slice(-1);
+    const measure = async (steps: MotionSteps): Promise<number> =>
+      Math.max(
+        ...(await errorsIn(
+          last,
+          parts.map((part) => part.contentAt(steps)),
+        )),
+      );
+    const still = parts.map((part) => part.contentAt(usualSteps(frames[0])));
+    const numbers = Object.fromEntries(
+      MOVING_NAMES.filter((name) => still.some(({ motion }) => motion.parts[name].rank > 0)).map((name) => [
+        name,
+        MOVING[name],
+      ]),
+    ) as Partial<Steps<MovingName>>;
+    if (Object.keys(numbers).length === 0) return usualSteps(frames[0]);
+    const { steps } = await findSteps({
+      ...{ usual: usualSteps(frames[0]), numbers, measure, target: this.#target, nearEnough: NEAR_ENOUGH },
+      share: (1 - SCENE_SHARE) * this.#target,
+      judge: async (tried: MotionSteps) => {
+        const error = await measure(tried);
+        onStep(`  ${decibels(error).toFixed(2)} dB in a frame of the first group`);
+        return { error };
+      },
+    });
+    return steps;
+  }
+}
+
+const usualSteps = (cloud: GaussianCloud): MotionSteps => ({
+  position: 0.15 * typicalSize(cloud),
+  rotation: 0.1,
+  scale: 0.1,
+  opacity: 0.03,
+  color: 0.05,
+});
+
+const bytesOf = ({ parts }: Pick<WrittenGroup, 'parts'>): number =>
+  parts.reduce((sum, part) => sum + part.bytes.length, 0);
+
+/** A frame of a group, and what compares others with it. */
+interface FrameJudge {
+  readonly frame: number;
+  readonly judge: GpuEvaluator;
+}
+
+async function judgesOf(device: GPUDevice, frames: readonly GaussianCloud[]): Promise<FrameJudge[]> {
+  const numbers = [...new Set(JUDGED.map((share) => Math.floor(share * frames.length)))];
+  const judges: FrameJudge[] = [];
+  for (const frame of numbers) judges.push({ frame, judge: await judgeOf(device, frames[frame], VIEWS, 7 + frame) });
+  return judges;
+}
+
+/** Compares other clouds with a frame, in `count` views. */
+function judgeOf(device: GPUDevice, cloud: GaussianCloud, count: number, seed: number): Promise<GpuEvaluator> {
+  const views = viewsAround(boundsOf(cloud), count, { seed });
+  return GpuEvaluator.create(device, cloud, { scored: views.slice(0, 1), searched: views, heldOut: views });
+}
+
+const frameOf = (parts: readonly ClipPartContent[], frame: number): GaussianCloud =>
+  clipFrame(parts, frame, 'a group of frames', new LoadBudget(2 ** 40));
+
+async function errorsIn(judges: readonly FrameJudge[], parts: readonly ClipPartContent[]): Promise<number[]> {
+  const errors: number[] = [];
+  for (const { judge, frame } of judges) errors.push(...(await judge.compare(frameOf(parts, frame), 'heldOut')));
+  return errors;
+}
+
+/** How much larger splats of the coarse part stand best for all. */
+async function growthIn({ judge, frame }: FrameJudge, [coarse]: readonly ClipPartContent[]): Promise<number> {
+  const cloud = frameOf([coarse], frame);
+  let [best, least] = [1, Infinity];
+  for (const grow of GROWTHS) {
+    const error = mean(await judge.compare({ ...cloud, scales: cloud.scales.map((value) => grow * value) }, 'heldOut'));
+    if (error < least) [best, least] = [grow, error];
+  }
+  return best;
+}
+
+function requireOneDegree(frames: readonly GaussianCloud[], degree = frames[0].shDegree): void {
+  const other = frames.find(({ shDegree }) => shDegree !== degree);
+  if (other === undefined) return;
+  throw new GaussianSplatError('argument/value', {
+    where: 'frames of a sequence',
+    expected: `spherical harmonics of degree ${degree} in each, as in the first`,
+    found: `degree ${other.shDegree}`,
+    remedy: 'export all frames in the same way',
+  });
+}

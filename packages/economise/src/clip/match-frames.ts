@@ -1,0 +1,127 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { PlaceGrid } from './place-grid.js';
+
+/** Differences of a match, each in the unit that makes them comparable; a pair of splats matches at {@link MOST_COST} or less. */
+const COLOR_UNIT = 0.25;
+const SIZE_UNIT = 0.5;
+const OPACITY_UNIT = 0.35;
+const SHAPE_UNIT = 0.3;
+const MOST_COST = 6;
+/** The search radius, in typical distances between neighbours. */
+const RADIUS = 3;
+/** Rounds in which splats whose best match was taken look for another. */
+const ROUNDS = 3;
+/** Share of the splats of the same numbers that must match for numbers to be taken for names. */
+const SAME_NUMBERS = 0.9;
+const LEAST_SIZE = 1e-12;
+
+/** What splats are compared by. */
+export interface Features {
+  readonly count: number;
+  /** [N, 3] in world units, relative to the origin of the sequence. */
+  readonly positions: Float32Array;
+  /** [N, 11]: constant coefficients, size, opacity and shape, each divided by its unit. */
+  readonly looks: Float32Array;
+}
+
+const LOOKS = 11;
+
+export function featuresOf(cloud: GaussianCloud, origin: readonly number[]): Features {
+  const { count, scales, opacities, sh, shDegree } = cloud;
+  const shift = cloud.origin.map((value, axis) => value - origin[axis]);
+  const positions = shift.some((value) => value !== 0)
+    ? cloud.positions.map((value, k) => value + shift[k % 3])
+    : cloud.positions;
+  const looks = new Float32Array(LOOKS * count);
+  const stride = 3 * shCoefficientCount(shDegree);
+  for (let i = 0; i < count; i++) {
+    for (let k = 0; k < 3; k++) looks[LOOKS * i + k] = sh[stride * i + k] / COLOR_UNIT;
+    const volume = scales[3 * i] * scales[3 * i + 1] * scales[3 * i + 2];
+    const longest = Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]);
+    looks[LOOKS * i + 3] =
+      (Math.log(Math.max(LEAST_SIZE, longest)) + Math.log(Math.max(LEAST_SIZE ** 3, volume)) / 3) / (2 * SIZE_UNIT);
+    looks[LOOKS * i + 4] = opacities[i] / OPACITY_UNIT;
+    putShape(cloud, i, looks, LOOKS * i + 5);
+  }
+  return { count, positions, looks };
+}
+
+/** Covariance of trace 1, which is the same whatever its axes are called. */
+function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float32Array, at: number): void {
+  const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
+  const axes = [
+    [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+    [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+    [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
+  ];
+  let trace = 0;
+  for (let k = 0; k < 3; k++) trace += scales[3 * i + k] ** 2;
+  let number = at;
+  for (let a = 0; a < 3; a++) {
+    for (let b = a; b < 3; b++, number++) {
+      let sum = 0;
+      for (let k = 0; k < 3; k++) sum += scales[3 * i + k] ** 2 * axes[k][a] * axes[k][b];
+      looks[number] = ((a === b ? 1 : Math.SQRT2) * sum) / (Math.max(trace, 1e-30) * SHAPE_UNIT);
+    }
+  }
+}
+
+/**
+ * Finds which splats of a frame are those of the frame before.
+ * @param before whose positions are where its splats are expected in the next frame
+ * @returns [splats of `next`] number in `before`, or -1 for a splat that is new
+ */
+export function matchFrames(before: Features, next: Features): Int32Array {
+  const grid = PlaceGrid.of(next.positions, next.count, RADIUS);
+  return byNumber(before, next, grid.cell) ?? byPlace(before, next, grid);
+}
+
+function costOf(a: Features, i: number, b: Features, j: number, unit: number): number {
+  let cost = 0;
+  for (let k = 0; k < 3; k++) cost += ((a.positions[3 * i + k] - b.positions[3 * j + k]) / unit) ** 2;
+  for (let k = 0; k < LOOKS; k++) cost += (a.looks[LOOKS * i + k] - b.looks[LOOKS * j + k]) ** 2;
+  return cost;
+}
+
+/** Where as many splats keep their numbers; undefined where numbers are no names. */
+function byNumber(before: Features, next: Features, unit: number): Int32Array | undefined {
+  if (before.count !== next.count) return undefined;
+  const found = new Int32Array(next.count).fill(-1);
+  let same = 0;
+  for (let i = 0; i < next.count; i++) {
+    if (costOf(before, i, next, i, unit) > MOST_COST) continue;
+    found[i] = i;
+    same++;
+  }
+  return same >= SAME_NUMBERS * next.count ? found : undefined;
+}
+
+/** The pairs that cost least: of those who want the same splat the nearest has it, and the others look again. */
+function byPlace(before: Features, next: Features, grid: PlaceGrid): Int32Array {
+  const found = new Int32Array(next.count).fill(-1);
+  const costs = new Float32Array(next.count);
+  let looking = Uint32Array.from({ length: before.count }, (_, i) => i);
+  for (let round = 0; round < ROUNDS && looking.length > 0; round++) {
+    const isOpen = found.map((owner) => (owner < 0 ? 1 : 0));
+    const lost: number[] = [];
+    for (const i of looking) {
+      let [best, least] = [-1, MOST_COST];
+      grid.forEachNear(before.positions, i, (j) => {
+        if (isOpen[j] === 0) return;
+        const cost = costOf(before, i, next, j, grid.cell);
+        if (cost < least) [best, least] = [j, cost];
+      });
+      if (best < 0) continue;
+      const owner = found[best];
+      if (owner >= 0 && costs[best] <= least) {
+        lost.push(i);
+        continue;
+      }
+      if (owner >= 0) lost.push(owner);
+      found[best] = i;
+      costs[best] = least;
+    }
+    looking = Uint32Array.from(lost);
+  }
+  return found;
+}

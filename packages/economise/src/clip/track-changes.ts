@@ -1,0 +1,94 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { MOVING, type MovingName } from '@gaussian-splat/formats';
+import { turnBetween } from '../motion/write-motion.js';
+import type { Tracks } from './tracks.js';
+
+/** Some of the splats of tracks. */
+export interface TrackedSplats {
+  readonly cloud: GaussianCloud;
+  /** [tracks] the place of a track in the cloud, or -1 where it is none of them. */
+  readonly placeOf: Int32Array;
+}
+
+const LEAST = 1e-12;
+
+/**
+ * [width · splats, frames] what each number of an attribute differs by from the cloud; before a splat's life and after it, as at its ends. Undefined where nothing differs.
+ */
+export function changesOfTracks(tracks: Tracks, splats: TrackedSplats, name: MovingName): Float32Array | undefined {
+  const { frames } = tracks;
+  const { count } = splats.cloud;
+  const changes = new Float32Array(MOVING[name] * count * frames.length);
+  const readOf = name === 'rotation' ? turnsOf(splats) : numbersOf(name, splats.cloud);
+  const own = new Float64Array(3);
+  let hasChanged = false;
+  frames.forEach((frame, f) => {
+    tracks.of[f].forEach((track, i) => {
+      const place = splats.placeOf[track];
+      if (place < 0) return;
+      readOf(frame, i, place, own);
+      for (let k = 0; k < MOVING[name]; k++) {
+        changes[(k * count + place) * frames.length + f] = own[k];
+        if (own[k] !== 0) hasChanged = true;
+      }
+    });
+  });
+  if (!hasChanged) return undefined;
+  splats.placeOf.forEach((place, track) => {
+    if (place < 0) return;
+    const [first, end] = [tracks.lives.first[track], tracks.lives.end[track]];
+    for (let k = 0; k < MOVING[name]; k++) {
+      const row = changes.subarray((k * count + place) * frames.length, (k * count + place + 1) * frames.length);
+      row.fill(row[first], 0, first);
+      row.fill(row[end - 1], end);
+    }
+  });
+  return changes;
+}
+
+/** Puts the numbers of splat `i` of a frame, less those of splat `place` of the cloud. */
+type Read = (frame: GaussianCloud, i: number, place: number, out: Float64Array) => void;
+
+function numbersOf(name: Exclude<MovingName, 'rotation'>, cloud: GaussianCloud): Read {
+  const stride = 3 * shCoefficientCount(cloud.shDegree);
+  const reads: Record<Exclude<MovingName, 'rotation'>, Read> = {
+    position: (frame, i, place, out) => {
+      for (let k = 0; k < 3; k++)
+        out[k] = frame.positions[3 * i + k] + (frame.origin[k] - cloud.origin[k]) - cloud.positions[3 * place + k];
+    },
+    scale: (frame, i, place, out) => {
+      for (let k = 0; k < 3; k++)
+        out[k] = Math.log(Math.max(LEAST, frame.scales[3 * i + k]) / Math.max(LEAST, cloud.scales[3 * place + k]));
+    },
+    opacity: (frame, i, place, out) => {
+      out[0] = frame.opacities[i] - cloud.opacities[place];
+    },
+    color: (frame, i, place, out) => {
+      for (let k = 0; k < 3; k++) out[k] = frame.sh[stride * i + k] - cloud.sh[stride * place + k];
+    },
+  };
+  return reads[name];
+}
+
+/** Axes as long as the angles, each the nearest to that of the frame before. */
+function turnsOf({ cloud }: TrackedSplats): Read {
+  const last = new Float64Array(4 * cloud.count);
+  const turn = new Float64Array(4);
+  const from = new Float32Array(4);
+  const to = new Float32Array(4);
+  return (frame, i, place, out) => {
+    for (let k = 0; k < 4; k++) {
+      from[k] = cloud.rotations[4 * place + k];
+      to[k] = frame.rotations[4 * i + k];
+    }
+    turnBetween(from, to, 0, turn);
+    let cosine = 0;
+    for (let k = 0; k < 4; k++) cosine += last[4 * place + k] * turn[k];
+    // Of a splat that was in no frame before, the smaller of both angles.
+    const sign = (cosine || turn[0]) < 0 ? -1 : 1;
+    for (let k = 0; k < 4; k++) last[4 * place + k] = turn[k] *= sign;
+    const length = Math.hypot(turn[1], turn[2], turn[3]);
+    const factor = length > 1e-12 ? (2 * Math.atan2(length, turn[0])) / length : 2;
+    for (let k = 0; k < 3; k++) out[k] = factor * turn[k + 1];
+  };
+}

@@ -1,0 +1,145 @@
+/** Loaded only when a clip is shown. */
+import { clipGroupAt, frameAt, type ClipIndex } from '@gaussian-splat/formats';
+import { AnimatedGaussians } from '@gaussian-splat/renderer';
+import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
+import type { SceneBounds } from '../camera/settings.js';
+import type { OpenedClip } from '../loading/clip-of.js';
+import type { ClipAnswer, ClipRequest, SceneRequest } from '../loading/protocol.js';
+import type { Here, SceneLoader } from '../loading/scene-loader.js';
+import { GroupCache } from './group-cache.js';
+import { GroupSlots } from './group-slots.js';
+import type { LiveListeners, LiveState, Timeline } from './live-model.js';
+
+export interface ClipOptions {
+  readonly request: SceneRequest;
+  readonly device: GPUDevice;
+  readonly loader: SceneLoader;
+  readonly signal: AbortSignal;
+  readonly listeners: LiveListeners;
+  readonly loops: () => boolean;
+  /** Where it begins, seconds. */
+  readonly startSeconds: number;
+  readonly memoryBudget: number | undefined;
+}
+
+/** Plays a clip: groups of frames are fetched ahead by byte ranges, uploaded once each, and their frames made on the GPU. */
+export class ClipPlayer implements Timeline {
+  readonly gaussians: AnimatedGaussians;
+  readonly bounds: SceneBounds;
+  readonly duration: number;
+  readonly #index: ClipIndex;
+  readonly #options: ClipOptions;
+  readonly #cache: GroupCache;
+  readonly #slots: GroupSlots;
+  #isClosed = false;
+
+  private constructor(options: ClipOptions, index: ClipIndex, gaussians: AnimatedGaussians, cache: GroupCache) {
+    this.#options = options;
+    this.#index = index;
+    this.gaussians = gaussians;
+    this.bounds = index.bounds;
+    this.duration = index.durationSeconds;
+    this.#cache = cache;
+    this.#slots = new GroupSlots(gaussians, index);
+  }
+
+  /** With a coarse image of the first frame. Rejects with GaussianSplatError, or the signal's reason. */
+  static async open(options: ClipOptions): Promise<ClipPlayer> {
+    const { device, loader, request, signal, memoryBudget, startSeconds, listeners } = options;
+    const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part'>, aborted: AbortSignal): Promise<T> => {
+      const { url, credentials, limits } = request;
+      const asked: ClipRequest = { isClip: true, url, credentials, limits, ...own };
+      const here = ({ openBoxes }: Here): Promise<ClipAnswer<T>> =>
+        openBoxes(asked, aborted, () => undefined) as Promise<ClipAnswer<T>>;
+      return (await loader.ask({ type: 'boxes', request: asked }, aborted, here)).clip;
+    };
+    const whole = await localFile(request.url);
+    const opened = await ask<OpenedClip>({ whole }, signal);
+    const { index } = opened;
+    const file = opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]);
+    const cache = new GroupCache(index, {
+      fetchPart: (group, part, aborted) => {
+        const { frames, parts } = index.groups[group];
+        return ask<PackedAnimation>(
+          { whole: file, part: { part: parts[part], frames, origin: index.origin } },
+          aborted,
+        );
+      },
+      onArrival: () => listeners.onInput(),
+      onError: (error) => listeners.onError(error),
+    });
+    const first = clipGroupAt(index, frameAt(index, startSeconds));
+    let gaussians: AnimatedGaussians | undefined;
+    try {
+      const arriving = cache.first(first, signal);
+      arriving.catch(() => undefined);
+      gaussians = await AnimatedGaussians.create(device, { ...index, parts: roomOf(index), memoryBudget });
+      await arriving;
+      signal.throwIfAborted();
+      const player = new ClipPlayer(options, index, gaussians, cache);
+      player.request({ timeSeconds: startSeconds });
+      return player;
+    } catch (error) {
+      cache.close();
+      gaussians?.destroy();
+      throw error;
+    }
+  }
+
+  /** Groups that are in the page's memory, or on their way. */
+  get heldGroups(): number {
+    return this.#cache.held;
+  }
+
+  get buffered(): readonly (readonly [number, number])[] {
+    const { framesPerSecond, groups } = this.#index;
+    const spans: [number, number][] = [];
+    for (const [k, { first, frames }] of groups.entries()) {
+      if (!this.#cache.get(k, 0)) continue;
+      const [start, end] = [first / framesPerSecond, (first + frames) / framesPerSecond];
+      const last = spans.at(-1);
+      if (last && last[1] === start) last[1] = end;
+      else spans.push([start, end]);
+    }
+    return spans;
+  }
+
+  isLacking(timeSeconds: number): boolean {
+    const group = clipGroupAt(this.#index, frameAt(this.#index, timeSeconds));
+    return !this.#cache.get(group, 0) && !this.#cache.isMissing(group, 0);
+  }
+
+  /** Shows the frame of a time, if it is there; sees to those that follow. */
+  request({ timeSeconds }: Pick<LiveState, 'timeSeconds'>): void {
+    const frame = frameAt(this.#index, timeSeconds);
+    const group = clipGroupAt(this.#index, frame);
+    this.#cache.want(group, this.#options.loops());
+    if (this.#slots.show(frame, group, this.#cache)) this.#options.listeners.onInput();
+    if (this.#slots.shownFrame === frame || this.#cache.isMissing(group, 0))
+      queueMicrotask(() => this.#isClosed || this.#options.listeners.onShown(timeSeconds));
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    this.#cache.close();
+  }
+}
+
+/** What the parts of any group need at most. */
+function roomOf({ groups }: ClipIndex): { rows: number; planes: number; frames: number }[] {
+  const room: { rows: number; planes: number; frames: number }[] = [];
+  for (const { frames, parts } of groups) {
+    parts.forEach(({ splats, planes }, k) => {
+      const own = (room[k] ??= { rows: 0, planes: 0, frames: 0 });
+      own.rows = Math.max(own.rows, splats);
+      own.planes = Math.max(own.planes, planes);
+      own.frames = Math.max(own.frames, frames);
+    });
+  }
+  return room;
+}
+
+/** A file that the page has itself. */
+async function localFile(url: string): Promise<Blob | undefined> {
+  return url.startsWith('blob:') ? (await fetch(url)).blob() : undefined;
+}

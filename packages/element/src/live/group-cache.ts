@@ -1,0 +1,168 @@
+import type { ClipIndex } from '@gaussian-splat/formats';
+import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
+
+export interface GroupSource {
+  fetchPart(group: number, part: number, signal: AbortSignal): Promise<PackedAnimation>;
+  /** A part has come. */
+  onArrival(): void;
+  /** A part cannot be had: told once. */
+  onError(error: unknown): void;
+}
+
+/** How far ahead groups are fetched; the next one always is. */
+const AHEAD_SECONDS = 6;
+/** Bytes of groups that are kept in the page's memory; that on show and the next one always are. */
+const MOST_BYTES = 160 << 20;
+/** Milliseconds before a part that did not come is asked for again, four times as many after each further failure, and how often it is asked for at all. */
+const RETRY_MS = 5_000;
+const MOST_TRIES = 4;
+
+/** What is known of a part. */
+interface Entry {
+  readonly group: number;
+  readonly part: number;
+  content?: PackedAnimation;
+  abort?: AbortController;
+  failures: number;
+  /** Until when it is not asked for. */
+  until: number;
+}
+
+/** Groups of a clip in the page's memory: fetched ahead one part after the other, and dropped where there is no room, those behind the time first. */
+export class GroupCache {
+  readonly #index: ClipIndex;
+  readonly #source: GroupSource;
+  readonly #entries = new Map<string, Entry>();
+  #wanted: readonly (readonly [group: number, part: number])[] = [];
+  #wantedFor = '';
+  #isClosed = false;
+
+  constructor(index: ClipIndex, source: GroupSource) {
+    this.#index = index;
+    this.#source = source;
+  }
+
+  /** Groups of which something is there or on its way. */
+  get held(): number {
+    return new Set(
+      [...this.#entries.values()].filter(({ content, abort }) => content ?? abort).map(({ group }) => group),
+    ).size;
+  }
+
+  get(group: number, part: number): PackedAnimation | undefined {
+    return this.#entries.get(keyOf(group, part))?.content;
+  }
+
+  /** True of a part that has not come, until it is asked for again. */
+  isMissing(group: number, part: number): boolean {
+    return performance.now() < (this.#entries.get(keyOf(group, part))?.until ?? -Infinity);
+  }
+
+  /** Fetches what the first frame needs. Rejects with what was thrown. */
+  async first(group: number, signal: AbortSignal): Promise<void> {
+    const content = await this.#source.fetchPart(group, 0, signal);
+    this.#entries.set(keyOf(group, 0), { group, part: 0, content, failures: 0, until: -Infinity });
+  }
+
+  /** The group whose frames are shown now. */
+  want(group: number, loops: boolean): void {
+    const key = `${group} ${loops}`;
+    if (key !== this.#wantedFor) {
+      this.#wantedFor = key;
+      this.#wanted = this.#wantedFrom(group, loops);
+      for (const entry of this.#entries.values()) {
+        if (!entry.abort || this.#isWanted(entry)) continue;
+        entry.abort.abort();
+        entry.abort = undefined;
+      }
+    }
+    this.#next();
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    for (const { abort } of this.#entries.values()) abort?.abort();
+    this.#entries.clear();
+  }
+
+  /** A coarse image of what comes next is worth more than a fine one of what is on show. */
+  #wantedFrom(group: number, loops: boolean): (readonly [number, number])[] {
+    const { groups, framesPerSecond } = this.#index;
+    const ahead: number[] = [];
+    let seconds = 0;
+    for (let k = 1; k < groups.length && (seconds < AHEAD_SECONDS || ahead.length === 0); k++) {
+      const next = group + k;
+      if (next >= groups.length && !loops) break;
+      ahead.push(next % groups.length);
+      seconds += groups[next % groups.length].frames / framesPerSecond;
+    }
+    const fine = (own: number): (readonly [number, number])[] =>
+      groups[own].parts.slice(1).map((_, k) => [own, k + 1] as const);
+    const [next, ...later] = ahead;
+    return [
+      [group, 0],
+      ...(next === undefined ? [] : [[next, 0] as const]),
+      ...fine(group),
+      ...(next === undefined ? [] : fine(next)),
+      ...later.flatMap((own) => [[own, 0] as const, ...fine(own)]),
+    ];
+  }
+
+  #isWanted = ({ group, part }: Entry): boolean => this.#wanted.some(([g, p]) => g === group && p === part);
+
+  #next(): void {
+    if (this.#isClosed) return;
+    for (const { abort } of this.#entries.values()) if (abort) return;
+    const due = this.#wanted.find(
+      // What makes a group finer is of no use without its coarse part.
+      ([group, part]) => !this.get(group, part) && !this.isMissing(group, part) && (part === 0 || this.get(group, 0)),
+    );
+    if (!due || !this.#makeRoom(due)) return;
+    void this.#fetch(due);
+  }
+
+  /** Drops what is not wanted, the oldest first, until a part has room. False if it has none all the same, and can wait. */
+  #makeRoom([group, part]: readonly [number, number]): boolean {
+    const needed = this.#bytesOf(group, part);
+    const kept = [...this.#entries].filter(([, { content }]) => content);
+    let sum = kept.reduce((total, [, { content }]) => total + bytesOf(content!), 0);
+    for (const [key, entry] of kept) {
+      if (sum + needed <= MOST_BYTES) return true;
+      if (this.#isWanted(entry)) continue;
+      sum -= bytesOf(entry.content!);
+      this.#entries.delete(key);
+    }
+    return sum + needed <= MOST_BYTES || this.#wanted.slice(0, 2).some(([own]) => own === group);
+  }
+
+  #bytesOf(group: number, part: number): number {
+    const { splats, planes } = this.#index.groups[group].parts[part];
+    return splats * (56 + 2 * planes);
+  }
+
+  async #fetch([group, part]: readonly [number, number]): Promise<void> {
+    const key = keyOf(group, part);
+    const entry: Entry = this.#entries.get(key) ?? { group, part, failures: 0, until: -Infinity };
+    const abort = new AbortController();
+    entry.abort = abort;
+    this.#entries.set(key, entry);
+    try {
+      const content = await this.#source.fetchPart(group, part, abort.signal);
+      if (abort.signal.aborted || this.#isClosed) return;
+      Object.assign(entry, { content, failures: 0 });
+    } catch (error) {
+      if (abort.signal.aborted || this.#isClosed) return;
+      entry.failures++;
+      entry.until = entry.failures < MOST_TRIES ? performance.now() + RETRY_MS * 4 ** (entry.failures - 1) : Infinity;
+      if (entry.failures === 1) this.#source.onError(error);
+    }
+    entry.abort = undefined;
+    this.#next();
+    this.#source.onArrival();
+  }
+}
+
+const keyOf = (group: number, part: number): string => `${group} ${part}`;
+
+const bytesOf = ({ bases, sh, codes, curves }: PackedAnimation): number =>
+  bases.byteLength + sh.byteLength + codes.byteLength + curves.byteLength;

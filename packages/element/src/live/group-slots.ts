@@ -1,0 +1,77 @@
+import type { ClipIndex } from '@gaussian-splat/formats';
+import { ANIMATION_SLOTS, type AnimatedGaussians } from '@gaussian-splat/renderer';
+import type { GroupCache } from './group-cache.js';
+
+/** Bytes that a frame uploads of what is not needed at once. */
+const BYTES_PER_FRAME = 1 << 20;
+
+/** Which groups are on the GPU, and what of them is on show. */
+export class GroupSlots {
+  readonly #gaussians: AnimatedGaussians;
+  readonly #index: ClipIndex;
+  /** Number of the group in each slot; -1 for none. */
+  readonly #groups = new Array<number>(ANIMATION_SLOTS).fill(-1);
+  #shownFrame = -1;
+  #shownSlot = 0;
+  /** Parts of the group that the frame on show was made of. */
+  #shownParts = 0;
+
+  constructor(gaussians: AnimatedGaussians, index: ClipIndex) {
+    this.#gaussians = gaussians;
+    this.#index = index;
+  }
+
+  /** Of the clip. */
+  get shownFrame(): number {
+    return this.#shownFrame;
+  }
+
+  /**
+   * Shows a frame of a group, as far as its parts are there, and uploads what is needed next.
+   * @returns whether there is more to upload
+   */
+  show(frame: number, group: number, cache: GroupCache): boolean {
+    const gaussians = this.#gaussians;
+    const coarse = cache.get(group, 0);
+    let slot = this.#groups.indexOf(group);
+    if (slot < 0 && coarse) slot = this.#take(group, this.#shownSlot);
+    if (slot >= 0 && coarse && !gaussians.isWritten(slot, 0)) gaussians.write(slot, 0, coarse);
+    let left = BYTES_PER_FRAME;
+    if (slot >= 0) left -= this.#upload(slot, group, cache, left);
+    if (slot >= 0 && gaussians.isWritten(slot, 0)) this.#draw(slot, frame, group);
+    const next = (group + 1) % this.#index.groups.length;
+    if (left > 0 && slot >= 0 && next !== group && cache.get(next, 0)) {
+      const other = this.#groups.indexOf(next);
+      left -= this.#upload(other < 0 ? this.#take(next, slot) : other, next, cache, left);
+    }
+    return left < BYTES_PER_FRAME;
+  }
+
+  /** A slot other than the one that is kept. */
+  #take(group: number, kept: number): number {
+    const slot = (kept + 1) % ANIMATION_SLOTS;
+    this.#gaussians.clear(slot);
+    this.#groups[slot] = group;
+    return slot;
+  }
+
+  #upload(slot: number, group: number, cache: GroupCache, most: number): number {
+    let written = 0;
+    this.#index.groups[group].parts.forEach((_, part) => {
+      const content = cache.get(group, part);
+      if (content && written < most && !this.#gaussians.isWritten(slot, part))
+        written += this.#gaussians.write(slot, part, content, most - written);
+    });
+    return written;
+  }
+
+  #draw(slot: number, frame: number, group: number): void {
+    const { first, parts } = this.#index.groups[group];
+    const there = parts.filter((_, part) => this.#gaussians.isWritten(slot, part)).length;
+    if (frame === this.#shownFrame && there === this.#shownParts) return;
+    this.#gaussians.show(slot, frame - first, there === parts.length);
+    this.#shownFrame = frame;
+    this.#shownSlot = slot;
+    this.#shownParts = there;
+  }
+}

@@ -1,0 +1,273 @@
+/** Clips: scenes that change over time, in one file that is read by byte ranges. docs/sequences.md describes it. */
+import { keepUsable, type Bounds, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { LoadBudget, type LoadLimits } from './budget.js';
+import { grouped, startsWith, viewOf } from './bytes.js';
+import { damaged } from './faults.js';
+import { isObject, parseJson, show, type Json } from './json.js';
+import { mergeClouds } from './merge-clouds.js';
+import { MOTION_VERSION, movedCloud, MOVING, MOVING_NAMES, readMotion, type Motion } from './motion.js';
+import { readScene } from './read-scene.js';
+
+const MAGIC = 'GSV\n';
+const VERSION = 1;
+/** Magic, version, and bytes of the index that follows. */
+export const CLIP_HEAD_BYTES = 12;
+export const MAX_CLIP_INDEX_BYTES = 1 << 24;
+const MAX_GROUP_FRAMES = 4096;
+const MAX_PARTS = 8;
+const MAX_GROUPS = 1_000_000;
+/** Planes of codes of a splat, for each frame of its group at most. */
+const PLANES_PER_FRAME = MOVING_NAMES.reduce((sum, name) => sum + MOVING[name], 0);
+
+/** Some of the splats of a group, and how they move: two pieces of the file, one behind the other. */
+export interface ClipPart {
+  /** Byte of the file at which its scene begins; its motion follows. */
+  readonly start: number;
+  /** Bytes of the splats, a scene file of any format. */
+  readonly sceneBytes: number;
+  /** Bytes of what they do, a file of motion. */
+  readonly motionBytes: number;
+  readonly splats: number;
+  /** Planes of codes in the motion. */
+  readonly planes: number;
+}
+
+/** Frames that follow one another, and need nothing of other groups. */
+export interface ClipGroup {
+  /** Number of its first frame in the clip. */
+  readonly first: number;
+  readonly frames: number;
+  /** The first part alone is a coarse image of the group; all parts together are all splats. */
+  readonly parts: readonly ClipPart[];
+}
+
+/** What the beginning of the file says of the rest. */
+export interface ClipIndex {
+  readonly framesPerSecond: number;
+  readonly frameCount: number;
+  readonly durationSeconds: number;
+  readonly shDegree: ShDegree;
+  readonly origin: Vector3;
+  readonly bounds: Bounds & { readonly up?: Vector3 | undefined };
+  readonly antialiased: boolean;
+  readonly filterVariance?: number | undefined;
+  /** By how much splats of the first part are enlarged while the others are missing. */
+  readonly grow: number;
+  readonly groups: readonly ClipGroup[];
+  /** Bytes of the whole file. */
+  readonly byteLength: number;
+}
+
+/** What {@link writeClipHead} writes; places follow from lengths. */
+export interface ClipHead extends Omit<ClipIndex, 'groups' | 'byteLength' | 'frameCount' | 'durationSeconds'> {
+  readonly groups: readonly {
+    readonly frames: number;
+    readonly parts: readonly Omit<ClipPart, 'start'>[];
+  }[];
+}
+
+/** Bytes of the index that follows the head. @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/unsupported` */
+export function clipIndexBytes(head: Uint8Array, name: string): number {
+  if (head.length < CLIP_HEAD_BYTES)
+    throw damaged(name, `a head of ${CLIP_HEAD_BYTES} bytes`, grouped(head.length), 'decode/truncated');
+  if (!startsWith(head, MAGIC)) throw damaged(name, 'a clip', 'another file', 'decode/header');
+  const view = viewOf(head);
+  const [version, length] = [view.getUint32(4, true), view.getUint32(8, true)];
+  if (version !== VERSION)
+    throw damaged(name, `a clip of version ${VERSION}`, `version ${version}`, 'decode/unsupported');
+  if (length > MAX_CLIP_INDEX_BYTES)
+    throw damaged(name, `an index of at most ${grouped(MAX_CLIP_INDEX_BYTES)} bytes`, grouped(length), 'decode/header');
+  return length;
+}
+
+/**
+ * Reads head and index.
+ * @param bytes of the beginning of the file; there may be more of them
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`, `out-of-memory/budget`
+ */
+export function parseClip(bytes: Uint8Array, name: string, limits: LoadLimits = {}): ClipIndex {
+  const length = clipIndexBytes(bytes, name);
+  const own = bytes.subarray(CLIP_HEAD_BYTES, CLIP_HEAD_BYTES + length);
+  if (own.length < length)
+    throw damaged(name, `an index of ${grouped(length)} bytes`, grouped(own.length), 'decode/truncated');
+  const json = parseJson({ bytes: own, name, budget: new LoadBudget(length, limits) }, MAX_CLIP_INDEX_BYTES);
+  return new IndexReader(json, name).read(CLIP_HEAD_BYTES + length);
+}
+
+/** Checks what an index says. */
+class IndexReader {
+  readonly #json: Json;
+  readonly #name: string;
+
+  constructor(json: Json, name: string) {
+    this.#json = json;
+    this.#name = name;
+  }
+
+  read(start: number): ClipIndex {
+    const { origin = [0, 0, 0], antialiased = false, filterVariance, groups, bounds } = this.#json;
+    const framesPerSecond = this.#number('framesPerSecond', this.#json.framesPerSecond, 1e-3, 1000);
+    const shDegree = this.#whole('shDegree', this.#json.shDegree ?? 0, 0, 3) as ShDegree;
+    if (!Array.isArray(groups) || groups.length < 1 || groups.length > MAX_GROUPS)
+      this.#fail('groups', `1 to ${grouped(MAX_GROUPS)} groups`, groups);
+    const found: ClipGroup[] = [];
+    let [first, at] = [0, start];
+    for (const [k, group] of (groups as unknown[]).entries()) {
+      const own = this.#group(`groups[${k}]`, group, first, at);
+      found.push(own);
+      first += own.frames;
+      const { start: begin, sceneBytes, motionBytes } = own.parts[own.parts.length - 1];
+      at = begin + sceneBytes + motionBytes;
+    }
+    if (!Number.isSafeInteger(at)) this.#fail('groups', 'a file whose bytes can be counted', at);
+    return {
+      ...{ framesPerSecond, shDegree, groups: found, byteLength: at },
+      ...{ frameCount: first, durationSeconds: first / framesPerSecond },
+      origin: this.#vector('origin', origin),
+      bounds: this.#bounds(bounds),
+      antialiased: antialiased === true,
+      filterVariance: filterVariance === undefined ? undefined : this.#number('filterVariance', filterVariance, 0, 100),
+      grow: this.#number('grow', this.#json.grow ?? 1, 1, 8),
+    };
+  }
+
+  /** `[frames, [splats, planes, bytes of the scene, bytes of the motion], ...]` */
+  #group(path: string, group: unknown, first: number, start: number): ClipGroup {
+    if (!Array.isArray(group) || group.length < 2 || group.length > 1 + MAX_PARTS)
+      this.#fail(path, `frames, and 1 to ${MAX_PARTS} parts`, group);
+    const [asked, ...rest] = group as unknown[];
+    const frames = this.#whole(`${path}[0]`, asked, 1, MAX_GROUP_FRAMES);
+    let at = start;
+    const parts = rest.map((part, k): ClipPart => {
+      const own = `${path}[${k + 1}]`;
+      if (!Array.isArray(part) || part.length !== 4) this.#fail(own, 'splats, planes, and two lengths in bytes', part);
+      const [splats, planes, sceneBytes, motionBytes] = part as unknown[];
+      const found = {
+        start: at,
+        splats: this.#whole(`${own}[0]`, splats, 1, 2 ** 28),
+        planes: this.#whole(`${own}[1]`, planes, 0, PLANES_PER_FRAME * frames),
+        sceneBytes: this.#whole(`${own}[2]`, sceneBytes, 1, 2 ** 31),
+        motionBytes: this.#whole(`${own}[3]`, motionBytes, 1, 2 ** 31),
+      };
+      at += found.sceneBytes + found.motionBytes;
+      return found;
+    });
+    return { first, frames, parts };
+  }
+
+  #bounds(bounds: unknown): ClipIndex['bounds'] {
+    if (!isObject(bounds)) return this.#fail('bounds', 'min, max, center and radius', bounds);
+    const { min, max, center, radius, up } = bounds;
+    return {
+      min: this.#vector('bounds.min', min),
+      max: this.#vector('bounds.max', max),
+      center: this.#vector('bounds.center', center),
+      radius: this.#number('bounds.radius', radius, Number.MIN_VALUE, 1e18),
+      ...(up !== undefined && { up: this.#vector('bounds.up', up) }),
+    };
+  }
+
+  #vector(path: string, value: unknown): Vector3 {
+    if (Array.isArray(value) && value.length === 3 && value.every((each) => Math.abs(each as number) <= 1e18))
+      return value as unknown as Vector3;
+    return this.#fail(path, 'three numbers', value);
+  }
+
+  #number(path: string, value: unknown, least: number, most: number): number {
+    const isNumber = typeof value === 'number' && value >= least && value <= most;
+    return isNumber ? value : this.#fail(path, `a number from ${least} to ${most}`, value);
+  }
+
+  #whole(path: string, value: unknown, least: number, most: number): number {
+    if (Number.isInteger(value)) return this.#number(path, value, least, most);
+    return this.#fail(path, `a whole number from ${least} to ${grouped(most)}`, value);
+  }
+
+  #fail(path: string, expected: string, found: unknown): never {
+    throw damaged(`${this.#name}, ${path}`, expected, show(found), 'decode/header');
+  }
+}
+
+/** Head and index of a file; what the parts hold follows, in their order. */
+export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
+  const rows = groups.map(({ frames, parts }) => [
+    frames,
+    ...parts.map(({ splats, planes, sceneBytes, motionBytes }) => [splats, planes, sceneBytes, motionBytes]),
+  ]);
+  const index = new TextEncoder().encode(JSON.stringify({ ...facts, groups: rows }));
+  const bytes = new Uint8Array(CLIP_HEAD_BYTES + index.length);
+  bytes.set(new TextEncoder().encode(MAGIC));
+  const view = viewOf(bytes);
+  view.setUint32(4, VERSION, true);
+  view.setUint32(8, index.length, true);
+  bytes.set(index, CLIP_HEAD_BYTES);
+  return bytes;
+}
+
+/** Number of the group that a frame is in. */
+export function clipGroupAt({ groups }: Pick<ClipIndex, 'groups'>, frame: number): number {
+  let [low, high] = [0, groups.length - 1];
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (groups[middle].first <= frame) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+/** What a part holds. */
+export interface ClipPartContent {
+  readonly cloud: GaussianCloud;
+  readonly motion: Motion;
+}
+
+export interface ClipPartSource {
+  /** The part's scene and motion. */
+  readonly bytes: Uint8Array;
+  readonly part: ClipPart;
+  readonly frames: number;
+  readonly name: string;
+  readonly limits?: LoadLimits;
+}
+
+/**
+ * Reads a part of a group.
+ * @throws GaussianSplatError as `readScene` and `readMotion` do, and `decode/header` where the index says otherwise
+ */
+export async function readClipPart({ bytes, part, frames, name, limits }: ClipPartSource): Promise<ClipPartContent> {
+  const { sceneBytes, motionBytes, splats, planes } = part;
+  if (bytes.length !== sceneBytes + motionBytes)
+    throw damaged(name, `${grouped(sceneBytes + motionBytes)} bytes`, grouped(bytes.length), 'decode/truncated');
+  const budget = new LoadBudget(bytes.length, limits);
+  budget.takeSplats(splats, 0, name);
+  const cloud = await readScene(bytes.subarray(0, sceneBytes), { name, ...limits });
+  if (cloud.count !== splats)
+    throw damaged(name, `${grouped(splats)} splats, as the index says`, grouped(cloud.count), 'decode/header');
+  const motion = await readMotion({
+    ...{ bytes: bytes.subarray(sceneBytes), name, splats, frames, budget },
+    version: MOTION_VERSION.lives,
+  });
+  const found = MOVING_NAMES.reduce((sum, each) => sum + MOVING[each] * motion.parts[each].rank, 0);
+  if (found !== planes) throw damaged(name, `${planes} planes, as the index says`, String(found), 'decode/header');
+  return { cloud, motion };
+}
+
+/**
+ * The splats of a frame that are alive in it.
+ * @param frame of the group, 0 being its first
+ * @throws GaussianSplatError `decode/empty`, `out-of-memory/budget`
+ */
+export function clipFrame(
+  parts: readonly ClipPartContent[],
+  frame: number,
+  name: string,
+  budget: LoadBudget,
+): GaussianCloud {
+  const moved = parts.map(({ cloud, motion }) => movedCloud(cloud, motion, frame, name, budget));
+  return keepUsable(
+    mergeClouds(
+      moved.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
+      { budget, name },
+    ),
+  );
+}

@@ -1,0 +1,260 @@
+import { GaussianSplatError, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import * as layouts from './generated/clip-layouts.js';
+import { constants } from './generated/shaders.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
+import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { writeStruct } from './gpu/struct.js';
+import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+import { CHUNK_NUMBERS } from './pack/chunks.js';
+import { GEOMETRY_WORDS } from './pack/pack.js';
+import { animationBytes, planeCodes, type PackedAnimation } from './pack/pack-animated.js';
+import { shWords } from './pack/sh.js';
+import { AnimateStage } from './stages/animate.js';
+
+const { CULL_GROUP } = constants;
+const PIECES = ['bases', 'sh', 'codes', 'curves'] as const;
+
+/** What the parts of any group of a clip need at most, in their order. */
+export interface AnimatedRoom {
+  readonly parts: readonly { readonly rows: number; readonly planes: number; readonly frames: number }[];
+  readonly shDegree: ShDegree;
+  readonly antialiased: boolean;
+  readonly filterVariance?: number | undefined;
+  readonly origin: Vector3;
+  /** By how much splats of the first part are enlarged while others are missing. */
+  readonly grow: number;
+  /** Bytes of GPU memory that it may take; default no limit but the device's. */
+  readonly memoryBudget?: number | undefined;
+}
+
+/** A part in one of the slots. */
+interface SlotPart {
+  readonly buffers: Readonly<Record<(typeof PIECES)[number], GPUBuffer>>;
+  readonly uniform: GPUBuffer;
+  /** `Animate` of shaders/animate.wgsl, as the uniform has it. */
+  readonly values: Uint32Array<ArrayBuffer>;
+  readonly bindings: GPUBindGroup;
+  readonly rowRoom: number;
+  /** What is being written, or has been, and how many bytes of it. */
+  content: PackedAnimation | undefined;
+  written: number;
+}
+
+/** Slots: the group that is shown, and the next one. */
+export const ANIMATION_SLOTS = 2;
+const FIELDS = layouts.Animate.fields;
+
+/**
+ * Gaussians of a clip: groups of frames are uploaded once, and each frame of them is made on the GPU. All buffers are made at the beginning, so that nothing is allocated while it plays.
+ */
+export class AnimatedGaussians implements GaussianScene {
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  readonly shPrecision = 'float16';
+  readonly antialiased: boolean;
+  readonly filterVariance?: number | undefined;
+  readonly origin: Vector3;
+  readonly pages: readonly GaussianPage[];
+  readonly #device: GPUDevice;
+  readonly #memory: GpuMemory;
+  readonly #reservation: Reservation;
+  readonly #stage: AnimateStage;
+  readonly #slots: readonly (readonly SlotPart[])[];
+  readonly #grow: number;
+  #version = 0;
+  #frameCount = 0;
+
+  private constructor(device: GPUDevice, room: AnimatedRoom) {
+    this.#device = device;
+    const rooms = room.parts.map(({ rows }) => CULL_GROUP * Math.ceil(rows / CULL_GROUP));
+    this.count = rooms.reduce((sum, rows) => sum + rows, 0);
+    this.shDegree = room.shDegree;
+    this.antialiased = room.antialiased;
+    this.filterVariance = room.filterVariance;
+    this.origin = room.origin;
+    this.#grow = room.grow;
+    this.#reservation = MemoryLedger.of(device).reserve(
+      whatOf(this.count),
+      bytesOf(room, this.count),
+      room.memoryBudget,
+    );
+    this.#memory = new GpuMemory(device);
+    try {
+      this.#stage = new AnimateStage(device);
+      const { storage, copySource } = BUFFER_USAGE;
+      const part = (name: string, words: number): GPUBuffer =>
+        this.#memory.buffer(`gs.animate.${name}`, 4 * words, storage | copySource);
+      const page = {
+        count: this.count,
+        geometry: part('geometry', GEOMETRY_WORDS * this.count),
+        sh: part('sh', shWords(this.shDegree, this.shPrecision) * this.count),
+        chunks: part('chunks', (CHUNK_NUMBERS * this.count) / CULL_GROUP),
+      };
+      this.pages = [page];
+      this.#slots = Array.from({ length: ANIMATION_SLOTS }, () => {
+        let first = 0;
+        return room.parts.map((own, k) => {
+          const slot = this.#slotPart(room, own, rooms[k], first);
+          first += rooms[k];
+          return slot;
+        });
+      });
+    } catch (error) {
+      this.destroy();
+      throw error;
+    }
+  }
+
+  /**
+   * Allocates room for the largest group of a clip, twice.
+   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/buffer-limit` for a part that is larger than a binding of the device, and
+   * `out-of-memory/allocation` if the device has no room.
+   */
+  static create(device: GPUDevice, room: AnimatedRoom): Promise<AnimatedGaussians> {
+    return withMemoryCheck(device, 'a clip', () => new AnimatedGaussians(device, room));
+  }
+
+  get version(): number {
+    return this.#version;
+  }
+
+  get byteLength(): number {
+    return this.#memory.byteLength;
+  }
+
+  /** Splats of the group that is shown. */
+  get frameCount(): number {
+    return this.#frameCount;
+  }
+
+  /** Forgets what a slot has. */
+  clear(slot: number): void {
+    for (const part of this.#slots[slot]) part.content = undefined;
+  }
+
+  /** True once all of a part is in a slot. */
+  isWritten(slot: number, part: number): boolean {
+    const { content, written } = this.#slots[slot][part];
+    return content !== undefined && written === sizeOf(content);
+  }
+
+  /**
+   * Uploads a part into a slot, or the next bytes of it.
+   * @param most bytes to upload now, at most
+   * @returns bytes that were uploaded
+   * @throws GaussianSplatError `argument/value` for a part that has no room
+   */
+  write(slot: number, part: number, content: PackedAnimation, most = Infinity): number {
+    const to = this.#slots[slot][part];
+    if (to.content !== content) {
+      for (const name of PIECES)
+        if (content[name].byteLength > to.buffers[name].size)
+          throw tooLarge(name, to.buffers[name].size, content[name].byteLength);
+      to.content = content;
+      to.written = 0;
+    }
+    const begin = to.written;
+    let at = 0;
+    for (const name of PIECES) {
+      const { buffer, byteOffset, byteLength } = content[name];
+      const from = Math.max(0, to.written - at);
+      const length = Math.min(byteLength - from, 4 * Math.floor((most - (to.written - begin)) / 4));
+      if (length > 0) {
+        this.#device.queue.writeBuffer(to.buffers[name], from, buffer, byteOffset + from, length);
+        to.written += length;
+      }
+      at += byteLength;
+    }
+    return to.written - begin;
+  }
+
+  /**
+   * Makes a frame of the group in a slot, of the parts that are there: what is submitted from now on shows it.
+   * @param frame of the group
+   * @param isWhole false while parts of the group are missing: what is there is enlarged
+   */
+  show(slot: number, frame: number, isWhole: boolean): void {
+    const parts = this.#slots[slot];
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.animate' });
+    const pass = encoder.beginComputePass({ label: 'gs.animate' });
+    this.#frameCount = 0;
+    parts.forEach((part, k) => {
+      const content = this.isWritten(slot, k) ? part.content : undefined;
+      this.#frameCount += content?.rows ?? 0;
+      setValues(part.values, content, frame, isWhole ? 1 : this.#grow);
+      this.#device.queue.writeBuffer(part.uniform, 0, part.values);
+      this.#stage.record(pass, part.bindings, part.rowRoom);
+    });
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+    this.#version++;
+  }
+
+  destroy(): void {
+    this.#reservation.release();
+    this.#memory.destroy();
+  }
+
+  #slotPart(
+    { shDegree }: AnimatedRoom,
+    { rows, planes, frames }: AnimatedRoom['parts'][number],
+    rowRoom: number,
+    first: number,
+  ): SlotPart {
+    const { storage, uniform, copyDestination } = BUFFER_USAGE;
+    const sizes = animationBytes({ rows, planes, frames, shDegree });
+    const buffer = (name: (typeof PIECES)[number]): GPUBuffer =>
+      this.#memory.buffer(`gs.animate.${name}`, sizes[name], storage | copyDestination);
+    const buffers = { bases: buffer('bases'), sh: buffer('sh'), codes: buffer('codes'), curves: buffer('curves') };
+    const values = new Uint32Array(layouts.Animate.size / 4);
+    const nothing = { ranks: [0, 0, 0, 0], color_rank: 0, curve_count: 0, frame: 0, rows: 0, plane_codes: 0, grow: 1 };
+    writeStruct(
+      layouts.Animate,
+      { ...nothing, row_room: rowRoom, first_row: first, sh_degree: shDegree },
+      values.buffer,
+    );
+    const own = this.#memory.buffer('gs.animate.uniform', layouts.Animate.size, uniform | copyDestination);
+    const [{ geometry, sh, chunks }] = this.pages;
+    const { bases, sh: base_sh, codes, curves } = buffers;
+    const bindings = this.#stage.bind({ animate: own, bases, base_sh, codes, curves, gaussians: geometry, sh, chunks });
+    return { buffers, uniform: own, values, bindings, rowRoom, content: undefined, written: 0 };
+  }
+}
+
+const grow = new Float32Array(1);
+const growBits = new Uint32Array(grow.buffer);
+
+/** In place: a frame allocates nothing. */
+function setValues(values: Uint32Array, content: PackedAnimation | undefined, frame: number, factor: number): void {
+  grow[0] = factor;
+  values[FIELDS.rows.offset / 4] = content?.rows ?? 0;
+  values[FIELDS.frame.offset / 4] = frame;
+  values[FIELDS.grow.offset / 4] = growBits[0];
+  if (content === undefined) return;
+  const { ranks, rows } = content;
+  for (let k = 0; k < 4; k++) values[FIELDS.ranks.offset / 4 + k] = ranks[k];
+  values[FIELDS.color_rank.offset / 4] = ranks[4];
+  values[FIELDS.curve_count.offset / 4] = ranks[0] + ranks[1] + ranks[2] + ranks[3] + ranks[4];
+  values[FIELDS.plane_codes.offset / 4] = planeCodes(rows);
+}
+
+const sizeOf = (content: PackedAnimation): number => PIECES.reduce((sum, name) => sum + content[name].byteLength, 0);
+
+function bytesOf({ parts, shDegree }: AnimatedRoom, count: number): number {
+  const ofSlot = parts.reduce((sum, own) => {
+    const { bases, sh, codes, curves } = animationBytes({ ...own, shDegree });
+    return sum + bases + sh + codes + curves;
+  }, 0);
+  return ANIMATION_SLOTS * ofSlot + count * bytesPerSplat(shDegree, 'float16');
+}
+
+const whatOf = (count: number): string => `clip of up to ${count} splats`;
+
+const tooLarge = (name: string, expected: number, found: number): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: `AnimatedGaussians.write, ${name}`,
+    expected: `at most ${expected} bytes`,
+    found: `${found}`,
+    remedy: 'create it with the room of the largest group',
+  });

@@ -1,0 +1,125 @@
+/** Clips: one file that is played by byte ranges, with the words of HTMLMediaElement. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, frames, nextEvent, show, showLoaded, until } from './support/harness.js';
+import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
+
+const CLIP = '/net/clip/ball.gsv';
+
+async function shows(element: GaussianSplatElement, isColour: (colour: Rgb) => boolean): Promise<boolean> {
+  return (await screenOf(element)).middleOf(isColour) !== null;
+}
+
+async function seek(element: GaussianSplatElement, seconds: number): Promise<void> {
+  const seeked = nextEvent(element, 'seeked');
+  element.currentTime = seconds;
+  assert(element.seeking, 'seeking');
+  await seeked;
+}
+
+async function showsAlone(element: GaussianSplatElement, frame: number): Promise<void> {
+  const colours = [isRed, isGreen, isBlue];
+  for (const [k, isColour] of colours.entries())
+    assertEqual(await shows(element, isColour), k === frame % 3, `colour ${k} in frame ${frame}`);
+}
+
+const spansOf = ({ buffered }: GaussianSplatElement): number[][] =>
+  Array.from({ length: buffered.length }, (_, k) => [buffered.start(k), buffered.end(k)]);
+
+describe('a clip', () => {
+  it('has a duration, and shows the frame of every time', async () => {
+    const element = await showLoaded({ src: CLIP });
+    assertEqual([element.duration, element.paused, element.currentTime], [1.2, true, 0], 'duration, paused, time');
+    assertEqual(element.readyState, 4, 'readyState');
+    await showsAlone(element, 0);
+    for (const [seconds, frame] of [
+      [0.15, 1],
+      [0.35, 3],
+      [0.55, 5],
+      [1.15, 11],
+      [0.05, 0],
+    ] as const) {
+      await seek(element, seconds);
+      await showsAlone(element, frame);
+    }
+    await until(() => JSON.stringify(spansOf(element)) === '[[0,1.2]]', 'all of it is there');
+  });
+
+  it('begins at the time that is asked for', async () => {
+    await showsAlone(await showLoaded({ src: CLIP, time: '0.85' }), 8);
+  });
+
+  it('plays to its end, and round and round with loop', async () => {
+    const element = await showLoaded({ src: CLIP });
+    const ended = nextEvent(element, 'ended');
+    await element.play();
+    await ended;
+    assertEqual([element.paused, element.ended], [true, true], 'paused, ended');
+    element.loop = true;
+    let [last, rounds] = [0, 0];
+    let waits = 0;
+    element.addEventListener('waiting', () => waits++);
+    await element.play();
+    await until(() => {
+      if (element.currentTime < last) rounds++;
+      last = element.currentTime;
+      return rounds >= 2;
+    }, 'two rounds');
+    element.pause();
+    assertEqual(waits, 0, 'waits');
+  });
+
+  it('waits for what has not come, and goes on from there', async () => {
+    const element = await showLoaded({ src: `${CLIP}?slow=700` });
+    const said: string[] = [];
+    for (const type of ['waiting', 'playing', 'ended'])
+      element.addEventListener(type, () => said.push(`${type} ${element.currentTime.toFixed(1)}`));
+    await element.play();
+    await until(() => said.some((each) => each.startsWith('waiting')), 'it waits');
+    const { currentTime } = element;
+    assertEqual(element.readyState, 2, 'readyState');
+    assert(currentTime > 0.39 && currentTime < 0.7, `it waits at ${currentTime} s, in the group that is missing`);
+    await until(() => said.some((each) => each.startsWith('ended')), 'it goes on to the end');
+    const order = said.map((each) => each.split(' ')[0]);
+    assertEqual(order.slice(0, 3), ['playing', 'waiting', 'playing'], 'events');
+  });
+
+  it('a seek into what has not come ends with the right frame', async () => {
+    const element = await showLoaded({ src: `${CLIP}?slow=300` });
+    await seek(element, 1.05);
+    await showsAlone(element, 10);
+  });
+
+  it('servers that send whole files only play it, too', async () => {
+    const element = await showLoaded({ src: `${CLIP}?whole` });
+    await seek(element, 0.75);
+    await showsAlone(element, 7);
+  });
+
+  it('a file that a visitor chose plays', async () => {
+    const file = await (await fetch(CLIP)).blob();
+    const element = await showLoaded({ src: `${URL.createObjectURL(file)}#ball.gsv` });
+    await seek(element, 0.95);
+    await showsAlone(element, 9);
+  });
+
+  it('a group that cannot be had is told of once, and passed over', async () => {
+    const element = await showLoaded({ src: `${CLIP}?lost=1` });
+    let errors = 0;
+    element.addEventListener('generator-error', () => errors++);
+    const ended = nextEvent(element, 'ended');
+    await element.play();
+    await ended;
+    await frames(3);
+    await showsAlone(element, 11);
+    assertEqual(errors, 1, 'errors');
+  });
+
+  it('what is no clip is an error with a name', async () => {
+    const element = show({ src: '/net/slow/cube.ply#x' });
+    element.src = URL.createObjectURL(new Blob([new Uint8Array(100)])) + '#other.gsv';
+    await nextEvent(element, 'error');
+    assertEqual(element.error?.code, 'decode', 'code');
+    assert(/a clip/.test(element.error?.message ?? ''), element.error?.message ?? 'no message');
+  });
+});

@@ -1,0 +1,134 @@
+/** What of a clip is kept in the page's memory: bounded however long it plays, the next group before a finer image of this one. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import type { ClipIndex } from '@gaussian-splat/formats';
+import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
+import { GroupCache } from '../../packages/element/dist/live/group-cache.js';
+
+const FRAMES = 30;
+const SPLATS = 150_000;
+const PLANES = 40;
+/** A part in memory, without the memory. */
+const partOf = (splats: number): PackedAnimation =>
+  ({
+    rows: splats,
+    bases: { byteLength: 48 * splats },
+    sh: { byteLength: 8 * splats },
+    codes: { byteLength: 2 * PLANES * splats },
+    curves: { byteLength: 0 },
+  }) as unknown as PackedAnimation;
+
+function clip(groups: number): ClipIndex {
+  const part = (splats: number): object => ({ splats, planes: PLANES, sceneBytes: 1, motionBytes: 1, start: 0 });
+  return {
+    framesPerSecond: 30,
+    groups: Array.from({ length: groups }, (_, k) => ({
+      ...{ first: FRAMES * k, frames: FRAMES },
+      parts: [part(SPLATS / 8), part((7 * SPLATS) / 8)],
+    })),
+  } as unknown as ClipIndex;
+}
+
+interface Bench {
+  readonly cache: GroupCache;
+  readonly asked: string[];
+  readonly errors: unknown[];
+  settle(): Promise<void>;
+}
+
+function bench(index: ClipIndex, fails: (group: number) => boolean = () => false): Bench {
+  const asked: string[] = [];
+  const errors: unknown[] = [];
+  const cache = new GroupCache(index, {
+    fetchPart: async (group, part, signal) => {
+      asked.push(`${group}.${part}`);
+      await Promise.resolve();
+      signal.throwIfAborted();
+      if (fails(group)) throw new Error('lost');
+      return partOf(index.groups[group].parts[part].splats);
+    },
+    onArrival: () => undefined,
+    onError: (error) => errors.push(error),
+  });
+  const settle = async (): Promise<void> => {
+    for (let k = 0; k < 200; k++) await Promise.resolve();
+  };
+  return { cache, asked, errors, settle };
+}
+
+test('coarse before fine, and the next group before a fine image of this one', async () => {
+  const { cache, asked, settle } = bench(clip(20));
+  cache.want(3, false);
+  await settle();
+  assert.deepEqual(asked.slice(0, 4), ['3.0', '4.0', '3.1', '4.1']);
+  assert.equal(asked.length, new Set(asked).size, 'nothing is asked for twice');
+  assert.ok(!asked.some((each) => each.startsWith('12.')), 'nothing far ahead');
+});
+
+test('at the end of a loop the beginning is fetched', async () => {
+  for (const loops of [true, false]) {
+    const { cache, asked, settle } = bench(clip(20));
+    cache.want(19, loops);
+    await settle();
+    assert.equal(asked.includes('0.0'), loops);
+  }
+});
+
+test('an hour of play holds no more than a minute', async () => {
+  const { cache, settle } = bench(clip(3600));
+  let [minute, hour] = [0, 0];
+  for (let group = 0; group < 3600; group++) {
+    cache.want(group, false);
+    await settle();
+    assert.ok(cache.get(group, 0) && cache.get(group, 1), `group ${group} is there`);
+    if (group < 60) minute = Math.max(minute, cache.held);
+    else hour = Math.max(hour, cache.held);
+  }
+  assert.ok(hour <= minute, `${hour} groups, ${minute} in the first minute`);
+  assert.ok(hour < 16, `${hour} groups are held`);
+});
+
+test('a short clip that loops is fetched once', async () => {
+  const { cache, asked, settle } = bench(clip(4));
+  for (let round = 0; round < 10; round++) {
+    for (let group = 0; group < 4; group++) {
+      cache.want(group, true);
+      await settle();
+    }
+  }
+  assert.equal(asked.length, 8);
+});
+
+test('a seek gives up what is on its way', async () => {
+  const index = clip(40);
+  const signals: AbortSignal[] = [];
+  const cache = new GroupCache(index, {
+    fetchPart: (_group, _part, signal) => {
+      signals.push(signal);
+      return new Promise((_, reject) => signal.addEventListener('abort', () => reject(signal.reason as Error)));
+    },
+    onArrival: () => undefined,
+    onError: () => assert.fail('nothing went wrong'),
+  });
+  cache.want(0, false);
+  cache.want(30, false);
+  assert.deepEqual(
+    signals.map(({ aborted }) => aborted),
+    [true, false],
+  );
+  cache.close();
+  assert.ok(signals[1].aborted);
+});
+
+test('what cannot be had is reported once, and passed over', async () => {
+  const { cache, errors, asked, settle } = bench(clip(8), (group) => group === 1);
+  cache.want(0, false);
+  await settle();
+  assert.ok(cache.isMissing(1, 0) && !cache.get(1, 0));
+  assert.ok(cache.get(2, 0), 'the group after it is there');
+  cache.want(1, false);
+  cache.want(1, false);
+  await settle();
+  assert.equal(asked.filter((each) => each === '1.0').length, 1);
+  assert.equal(errors.length, 1);
+});

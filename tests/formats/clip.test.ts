@@ -1,0 +1,145 @@
+/** Clips: what is read is what was written, splats come and go, and what an index says is checked before anything is made of it. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import type { GaussianCloud } from '@gaussian-splat/core';
+import {
+  CLIP_HEAD_BYTES,
+  clipFrame,
+  clipGroupAt,
+  LoadBudget,
+  parseClip,
+  readClipPart,
+  type ClipIndex,
+  type ClipPartContent,
+} from '@gaussian-splat/formats';
+import { clipOf } from '../support/clips.js';
+import { fountain } from '../support/scenes/fountain.js';
+
+const FRAMES = 24;
+const frameOf = fountain({ splats: 600, frames: FRAMES, framesPerSecond: 10 });
+const sources = Array.from({ length: FRAMES }, (_, frame) => frameOf(frame));
+const clip = await clipOf((frame) => sources[frame], { frames: FRAMES, framesPerGroup: 12 });
+const index = parseClip(clip.bytes, 'a.gsv');
+
+const partsOf = (group: number): Promise<ClipPartContent[]> =>
+  Promise.all(
+    index.groups[group].parts.map((part) => {
+      const bytes = clip.bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
+      return readClipPart({ bytes, part, frames: index.groups[group].frames, name: 'a.gsv' });
+    }),
+  );
+
+/** Distance from each splat that can be seen to the nearest of another cloud that has its colour. */
+function farthest(from: GaussianCloud, to: GaussianCloud): number {
+  let most = 0;
+  for (let i = 0; i < from.count; i++) {
+    if (from.opacities[i] < 0.05) continue;
+    let least = Infinity;
+    for (let k = 0; k < to.count; k++) {
+      if (Math.abs(from.sh[3 * i] - to.sh[3 * k]) > 0.2 || to.opacities[k] === 0) continue;
+      least = Math.min(least, Math.hypot(...[0, 1, 2].map((a) => from.positions[3 * i + a] - to.positions[3 * k + a])));
+    }
+    most = Math.max(most, least);
+  }
+  return most;
+}
+
+test('the index says where groups and parts are', () => {
+  assert.deepEqual([index.frameCount, index.framesPerSecond, index.durationSeconds], [FRAMES, 10, 2.4]);
+  assert.equal(index.byteLength, clip.bytes.length);
+  assert.deepEqual(
+    index.groups.map(({ first, frames, parts }) => [first, frames, parts.length]),
+    [
+      [0, 12, 2],
+      [12, 12, 2],
+    ],
+  );
+  assert.deepEqual(
+    [0, 11, 12, 23].map((frame) => clipGroupAt(index, frame)),
+    [0, 0, 1, 1],
+  );
+  const [coarse, rest] = index.groups[0].parts;
+  assert.ok(coarse.splats * 6 < rest.splats, `${coarse.splats} of ${rest.splats} splats are coarse`);
+});
+
+test('splats are followed though no frame says which they were, and are gone when they are gone', async () => {
+  const all = index.groups.reduce((sum, { parts }) => sum + parts.reduce((own, { splats }) => own + splats, 0), 0);
+  // Each group has each splat once that is in one of its frames: the ground, the body, and all drops of its time.
+  assert.ok(all < 2 * 1.5 * sources[0].count, `${all} splats in two groups`);
+  for (const frame of [0, 5, 11, 12, 20, 23]) {
+    const group = clipGroupAt(index, frame);
+    const found = clipFrame(await partsOf(group), frame - index.groups[group].first, 'a.gsv', new LoadBudget(1 << 24));
+    const alive = found.opacities.filter((opacity) => opacity > 0).length;
+    assert.ok(Math.abs(alive - sources[frame].count) <= 0.02 * sources[frame].count, `frame ${frame}: ${alive} splats`);
+    const [lost, added] = [farthest(sources[frame], found), farthest(found, sources[frame])];
+    assert.ok(lost < 0.05 && added < 0.05, `frame ${frame}: ${lost} and ${added} away`);
+  }
+});
+
+/** The same file with another index. */
+function withIndex(change: (json: Record<string, unknown> & { groups: (number | number[])[][] }) => void): Uint8Array {
+  const length = new DataView(clip.bytes.buffer).getUint32(8, true);
+  const json = JSON.parse(new TextDecoder().decode(clip.bytes.subarray(CLIP_HEAD_BYTES, CLIP_HEAD_BYTES + length)));
+  change(json);
+  const text = new TextEncoder().encode(JSON.stringify(json));
+  const bytes = new Uint8Array(CLIP_HEAD_BYTES + text.length);
+  bytes.set(clip.bytes.subarray(0, CLIP_HEAD_BYTES));
+  new DataView(bytes.buffer).setUint32(8, text.length, true);
+  bytes.set(text, CLIP_HEAD_BYTES);
+  return bytes;
+}
+
+const withPart = (k: number, value: unknown): Uint8Array =>
+  withIndex(({ groups }) => ((groups[0][1] as unknown[])[k] = value));
+
+test('what an index cannot say is refused by name', () => {
+  const cases: readonly (readonly [string, () => Uint8Array, RegExp])[] = [
+    ['another file', () => new Uint8Array(64), /^decode\/header.*another file/],
+    ['a cut head', () => clip.bytes.subarray(0, 8), /^decode\/truncated/],
+    ['a cut index', () => clip.bytes.subarray(0, 40), /^decode\/truncated/],
+    ['no groups', () => withIndex((json) => (json.groups = [])), /^decode\/header.*groups/],
+    ['no frames', () => withIndex((json) => (json.groups[0][0] = 0)), /^decode\/header.*groups\[0\]\[0\]/],
+    ['endless frames', () => withIndex((json) => (json.groups[0][0] = 1e9)), /^decode\/header/],
+    ['no splats', () => withPart(0, 0), /^decode\/header/],
+    ['endless splats', () => withPart(0, 1e12), /^decode\/header/],
+    ['endless planes', () => withPart(1, 1e6), /^decode\/header/],
+    ['half a byte', () => withPart(2, 1.5), /^decode\/header/],
+    ['bytes before the file', () => withPart(3, -5), /^decode\/header/],
+    ['no bounds', () => withIndex((json) => delete json.bounds), /^decode\/header.*bounds/],
+    ['no time', () => withIndex((json) => (json.framesPerSecond = 0)), /^decode\/header.*framesPerSecond/],
+  ];
+  for (const [name, make, expected] of cases) {
+    let said = 'nothing';
+    try {
+      parseClip(make(), 'a.gsv');
+    } catch (error) {
+      said = `${(error as { code: string }).code} ${(error as Error).message}`;
+    }
+    assert.match(said, expected, name);
+  }
+});
+
+test('parts that are others than the index says are refused', async () => {
+  const read = async (asked: ClipIndex, bytes = clip.bytes): Promise<string> => {
+    const { frames, parts } = asked.groups[0];
+    const [part] = parts;
+    const own = bytes.subarray(part.start, part.start + part.sceneBytes + part.motionBytes);
+    return readClipPart({ bytes: own, part, frames, name: 'a.gsv' }).then(
+      () => 'nothing',
+      (error: Error & { code: string }) => `${error.code} ${error.message}`,
+    );
+  };
+  const changed = (change: Partial<ClipIndex['groups'][0]['parts'][0]>, frames = 12): ClipIndex => ({
+    ...index,
+    groups: [{ ...index.groups[0], frames, parts: [{ ...index.groups[0].parts[0], ...change }] }],
+  });
+  const [{ splats, planes }] = index.groups[0].parts;
+  assert.match(await read(changed({ splats: splats + 1 })), /^decode\/header.*as the index says/);
+  assert.match(await read(changed({ planes: planes + 1 })), /^decode\/header.*as the index says/);
+  assert.match(await read(changed({}, 13)), /^decode\/header.*13 frames/);
+  assert.match(await read(changed({ splats: 2 ** 27 })), /^out-of-memory\/budget/);
+  const damaged = clip.bytes.slice();
+  const [part] = index.groups[0].parts;
+  damaged.fill(0xff, part.start + part.sceneBytes + 2, part.start + part.sceneBytes + 40);
+  assert.match(await read(index, damaged), /^decode\//);
+});
