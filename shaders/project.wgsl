@@ -28,7 +28,7 @@ fn sh_word(i: u32) -> vec2u {
 // visible range of that number is a logarithmic key that needs no logarithm.
 fn depth_key(depth: f32) -> u32 {
   let depth_bits = bitcast<u32>(depth);
-  if (view.key_bits == 32u) { return depth_bits; }
+  if (view.key_bits >= 32u) { return depth_bits; }
   let nearest = ~gathered[NEAREST_INVERTED];
   let range = f32(max(gathered[FARTHEST] - nearest, 1u));
   // A depth computed anew may lie a rounding before the nearest one.
@@ -57,5 +57,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
   let color = splat_sh_color(i, normalize(toward));
   splats[slot] = pack_splat(e, color);
-  keys[slot] = depth_key(e.depth);
+  let offset = (g.position - view.eye) - view.eye_rest;
+  keys[slot] = depth_key(select(e.depth, length(offset), view.key_bits > 32u));
 }

@@ -26,7 +26,7 @@ struct View {
   antialiased: u32,
   // Variance in px² that the low-pass filter adds to both screen axes.
   filter_variance: f32,
-  // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range.
+  // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range; 33 for the distance from the eye in its place.
   key_bits: u32,
   // Most that the camera's matrix stretches a vector: 1 unless it is more than a rotation and a translation.
   stretch: f32,

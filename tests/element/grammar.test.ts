@@ -6,9 +6,12 @@ import {
   fieldOfViewGrammar,
   numberGrammar,
   orbitGrammar,
+  readAttribute,
   targetGrammar,
   upGrammar,
+  type AttributeGrammar,
 } from '../../packages/element/src/camera/grammar.js';
+import { lengthGrammar, optionalLengthGrammar } from '../../packages/element/src/camera/lengths.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../../packages/element/src/camera/values.js';
 
 const orbit = orbitGrammar('0deg 75deg auto');
@@ -26,20 +29,23 @@ test('detail: a word, or pixels', () => {
   }
 });
 
-test('lengths of walkers: above 0, with a unit', () => {
-  const read = (raw: object, warn: (sentence: string) => void = assert.fail): unknown[] => {
-    const { eyeHeight, unit, walkMap, navigation } = readAttributes({ ...ABSENT, ...raw } as RawAttributes, warn);
-    return [eyeHeight, unit, walkMap, navigation];
-  };
-  assert.deepEqual(read({}), [1.6, undefined, 'auto', 'orbit']);
-  assert.deepEqual(read({ eyeHeight: '120cm', unit: ' 37CM ', walkMap: ' a.floor ', navigation: 'walk' }), [
-    ...[1.2, 0.37, 'a.floor', 'walk'],
-  ]);
+test('lengths of late code: above 0, with a unit', () => {
+  const read = <T>(written: string | null, grammar: AttributeGrammar<T>, warn: (sentence: string) => void): T =>
+    readAttribute('length', written, grammar, warn);
+  assert.equal(read(null, lengthGrammar('1.6m'), assert.fail), 1.6);
+  assert.equal(read(null, optionalLengthGrammar, assert.fail), undefined);
+  assert.equal(read('120cm', lengthGrammar('1.6m'), assert.fail), 1.2);
+  assert.equal(read(' 37CM ', optionalLengthGrammar, assert.fail), 0.37);
   for (const malformed of ['1', '0m', '-1m', 'auto', '1 m', '1km']) {
     const said: string[] = [];
-    assert.deepEqual(read({ eyeHeight: malformed, unit: malformed }, (text) => said.push(text)).slice(0, 2), [
-      ...[1.6, undefined],
-    ]);
+    assert.equal(
+      read(malformed, lengthGrammar('1.6m'), (text) => said.push(text)),
+      1.6,
+    );
+    assert.equal(
+      read(malformed, optionalLengthGrammar, (text) => said.push(text)),
+      undefined,
+    );
     assert.equal(said.length, 2, malformed);
   }
 });

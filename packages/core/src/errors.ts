@@ -41,6 +41,8 @@ export type ErrorCode =
   | 'unsupported/wrong-image'
   /** There is no WebGPU, and WebGL 2 in its place cannot show what is asked for, or fails. */
   | 'unsupported/webgl'
+  /** There is no session of VR or AR: no device, no browser for it, or the page may not. */
+  | 'unsupported/xr'
   /** The scene needs more GPU memory than a buffer or the device may hold. */
   | 'out-of-memory/buffer-limit'
   | 'out-of-memory/budget'
@@ -52,6 +54,8 @@ export type ErrorCode =
   /** A caller's argument breaks the documented contract of a function. */
   | 'argument/camera'
   | 'argument/cloud'
+  /** A method was called outside of a person's click. */
+  | 'argument/activation'
   | 'argument/value';
 
 /** Stable codes of everything that can be wrong between an ONNX file, its contract and what it writes. */

@@ -1,5 +1,14 @@
 export * from './bounds.js';
-export * from './camera.js';
+export {
+  cameraFromCalibration,
+  DEFAULT_FAR,
+  DEFAULT_NEAR,
+  lookAt,
+  validateCamera,
+  type CalibratedView,
+  type Camera,
+} from './camera.js';
+export * from './projections.js';
 export * from './errors.js';
 export * from './gaussian-cloud.js';
 export * from './half.js';

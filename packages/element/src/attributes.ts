@@ -9,9 +9,7 @@ import {
   angleGrammar,
   fieldOfViewGrammar,
   keywordGrammar,
-  lengthGrammar,
   numberGrammar,
-  optionalLengthGrammar,
   orbitGrammar,
   readAttribute,
   targetGrammar,
@@ -45,7 +43,7 @@ export type FilterChoice = 'auto' | SplatFilter;
 /** What draws: `auto` is WebGPU where the browser has it, else WebGL 2. */
 export type RendererChoice = 'auto' | 'webgpu' | 'webgl';
 /** What splats are ordered by. `auto`: what the file says, else their centres. */
-export type OrderChoice = 'auto' | 'center' | 'pixel';
+export type OrderChoice = 'auto' | 'center' | 'pixel' | 'distance';
 /** When the wheel zooms, and when it is the page's. */
 export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 
@@ -257,19 +255,58 @@ export const ATTRIBUTES = {
    * @default `auto`
    * @example walk-map="garden.floor"
    */
-  walkMap: read({ expected: 'auto, or a URL', fallback: 'auto', parse: (written): string => written.trim() || 'auto' }),
+  walkMap: text(),
   /**
    * Height of a walker's eyes above the floor, with `m`, `cm` or `mm`.
    * @default `1.6m`
    * @example eye-height="1.2m"
    */
-  eyeHeight: read(lengthGrammar('1.6m')),
+  eyeHeight: text(),
   /**
-   * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking takes a unit for one meter.
+   * Length of one unit of the scene's file, with `m`, `cm` or `mm`. Without it, walking and VR take a unit for one meter, and rulers show numbers alone.
    * @default unknown
    * @example unit="37cm"
    */
-  unit: read(optionalLengthGrammar),
+  unit: text(),
+  /**
+   * Offers VR where the browser has a headset: a button, which the slot `vr-button` replaces, and `activateVR()`.
+   * @example vr
+   */
+  vr: flag(),
+  /**
+   * Offers AR where the browser has it: a button, which the slot `ar-button` replaces, and `activateAR()`. The subject of the scene stands on the floor of the room.
+   * @example ar
+   */
+  ar: flag(),
+  /**
+   * How AR is shown: `webxr` in the page; `quick-look` on iPhones, with the model of `ios-src`. `scene-viewer` is known and never chosen: it reads no splats.
+   * @default `webxr quick-look`
+   * @example ar-modes="webxr"
+   */
+  arModes: text(),
+  /**
+   * Where an object of AR stands: on the `floor` or on a `wall`.
+   * @default `floor`
+   * @example ar-placement="wall"
+   */
+  arPlacement: text(),
+  /**
+   * `auto` shows an object of AR 0.5 to 1 m large at first, and two fingers scale it. `fixed` keeps its true size, which takes `unit`.
+   * @default `auto`
+   * @example ar-scale="fixed"
+   */
+  arScale: text(),
+  /**
+   * URL of a USDZ model for iPhones, which have no WebXR: a link says that it is a simplified model.
+   * @default none
+   * @example ios-src="vase.usdz"
+   */
+  iosSrc: text(),
+  /**
+   * Gives visitors a ruler: a button, then two points by mouse, touch or keyboard. The event `measure` has the length.
+   * @example measure
+   */
+  measure: flag(),
   /**
    * Turns the camera around the scene until a visitor touches it. It does not start for visitors who ask for less motion, nor while the scene has the
    * keyboard. A button stops it.
@@ -309,6 +346,7 @@ export const ATTRIBUTES = {
   /**
    * The words of the element in the language of the page: JSON or, as a property, an object. Keys: `front`, `upper-front`, `lower-front`, the same three
    * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-walk`, `keys-views`; `views`, `next-view`, `previous-view`;
+   * `vr`, `ar`, `exit-ar`, `ar-simplified`, `measure`, `measure-keys`, `measure-none`;
    * `show` (`…` stands for `alt`), `loading`, `blocked`, `reset`, `pause`, `play`, `details`; and `error-` before each `error.code`. Without it the words are
    * English, and marked as English.
    * @default English
@@ -365,12 +403,13 @@ export const ATTRIBUTES = {
    */
   filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
   /**
-   * What splats are ordered by. `center`: the depth of their centers, as most scenes are trained. `pixel`: at each pixel the point of its ray where a splat is
+   * What splats are ordered by. `center`: the depth of their centers, as most scenes are trained. `distance`: their distance from the eye, which turning the camera does
+   * not change, so that nothing pops, but which differs from how scenes are trained. `pixel`: at each pixel the point of its ray where a splat is
    * densest. This does not pop when the camera turns, fits scenes that StopThePop trained, and takes the GPU longer.
    * @default `auto`: what the file says, else `center`
    * @example order="pixel"
    */
-  order: keyword<OrderChoice>(['auto', 'center', 'pixel']),
+  order: keyword<OrderChoice>(['auto', 'center', 'pixel', 'distance']),
   /**
    * Levels of detail. `auto` builds them where the GPU is too slow for the scene, and draws them while moving only. `off` builds none. Pixels such as
    * `1px` allow this error in every frame. Streamed scenes (`detail.json`, `lod-meta.json`) have levels: `auto` is `1px` for them, and `off` loads a

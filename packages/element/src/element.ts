@@ -91,6 +91,9 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
  * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
  * @fires {CustomEvent<WalkReadyDetail>} walk-ready - Fired when the floor of `navigation="walk"` is known and the camera stands on it.
+ * @fires {CustomEvent<ImmersiveStatusDetail>} vr-status - VR can be started, has started, is over, or failed.
+ * @fires {CustomEvent<ImmersiveStatusDetail>} ar-status - The same for AR; the object stands in the room.
+ * @fires {CustomEvent<MeasureDetail>} measure - A visitor has measured a length.
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - The element has come into sight, or left it.
  * @fires {CustomEvent<ElementError>} generator-error - A run of the generator failed; the last good frame stays.

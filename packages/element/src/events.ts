@@ -1,3 +1,4 @@
+import type { ScenePoint } from './camera/values.js';
 import type { ElementError } from './errors.js';
 
 /**
@@ -20,6 +21,26 @@ export interface ViewChangeDetail {
 export interface WalkReadyDetail {
   /** Area of the floor, m². */
   readonly area: number;
+}
+
+export interface ImmersiveStatusDetail {
+  readonly status: 'not-presenting' | 'session-started' | 'object-placed' | 'failed';
+  /** Why it failed. */
+  readonly reason?: string;
+}
+
+export interface MeasureDetail {
+  /** Ends of the ruler, viewer space. */
+  readonly from: ScenePoint;
+  readonly to: ScenePoint;
+  /** In units of the scene. */
+  readonly length: number;
+  /** What the length may be off by, in units of the scene. */
+  readonly uncertainty: number;
+  /** The length in meters; null unless the attribute `unit` says how long a unit is. */
+  readonly meters: number | null;
+  /** Meters of a unit, where that is known. */
+  readonly unit: number | null;
 }
 
 export interface LoadDetail {
@@ -64,6 +85,12 @@ export interface GaussianSplatEventMap {
   'view-change': CustomEvent<ViewChangeDetail>;
   /** Fired when the floor of `navigation="walk"` is known and the camera stands on it. */
   'walk-ready': CustomEvent<WalkReadyDetail>;
+  /** VR can be started, has started, is over, or failed. */
+  'vr-status': CustomEvent<ImmersiveStatusDetail>;
+  /** The same for AR; the object stands in the room. */
+  'ar-status': CustomEvent<ImmersiveStatusDetail>;
+  /** A visitor has measured a length. */
+  measure: CustomEvent<MeasureDetail>;
   /** The poster has given way to the scene. */
   'poster-dismissed': Event;
   /** The element has come into sight, or left it. */

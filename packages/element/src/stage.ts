@@ -90,6 +90,14 @@ export class Stage
     },
     this.#update,
   );
+  /** VR, AR and the ruler. */
+  readonly extras = new Lazy(
+    'the code for VR, AR and measuring',
+    async () => new (await import('./xr/extras.js')).Extras(this.element, this),
+    this.#update,
+  );
+  /** A session shows the scene: the page does not. */
+  isImmersed = false;
   /** Puts the frame on paper; fetched after the first frame. */
   readonly #print = new Lazy('the code for printing', async () => {
     const { PrintController } = await import('./controllers/print-controller.js');
@@ -304,7 +312,7 @@ export class Stage
   // What the controllers ask.
 
   get isVisible(): boolean {
-    return this.#visibility.isVisible;
+    return this.#visibility.isVisible && !this.isImmersed;
   }
 
   /** Whether previews are of use: an eager load begins before it is known whether the element is in view. */
@@ -488,6 +496,8 @@ export class Stage
     if (!this.sources.own.isLeaving) this.playback.keepScene();
     if (this.attributes.views) this.tour.want(this.#warnOf);
     if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
+    const { vr, ar, measure } = this.attributes;
+    if (vr || ar || measure) this.extras.want(this.#warnOf);
     if (this.input.enabled) this.#hands.want(this.#warnOf);
     this.reveal.settle();
     this.sources.request();

@@ -24,6 +24,9 @@ export type HandWord = 'keys-orbit' | 'keys-fly' | 'interaction-prompt' | 'reset
 /** Words of the switch for what moves by itself, likewise. */
 export type MotionWord = 'pause' | 'play';
 
+/** Words of VR, AR and measuring, which few pages have. */
+export type ExtraWord = 'vr' | 'ar' | 'exit-ar' | 'ar-simplified' | 'measure' | 'measure-keys' | 'measure-none';
+
 /** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
 export type SpokenStrings = Readonly<
   Partial<
@@ -35,7 +38,8 @@ export type SpokenStrings = Readonly<
       | ViewWord
       | WalkWord
       | HandWord
-      | MotionWord,
+      | MotionWord
+      | ExtraWord,
       string
     >
   >

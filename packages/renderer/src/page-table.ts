@@ -130,13 +130,14 @@ export class PageTable {
   look(
     camera: Camera,
     pixelArea: number,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: RenderSettings,
+    { shDegree, depthKeyBits, order, detail, detailFade, splatBudget }: RenderSettings,
     filter?: SplatFilter,
     mostCovered?: number,
   ): void {
     const shared = {
       sh_cap: shDegree,
-      key_bits: depthKeyBits,
+      // See shaders/shared/view.wgsl.
+      key_bits: order === 'distance' ? 33 : depthKeyBits,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,

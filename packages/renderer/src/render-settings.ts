@@ -33,11 +33,12 @@ export interface RenderSettings {
    */
   readonly transmittanceMin: number;
   /**
-   * What splats are ordered by: `center`, the depth of their centres, as most scenes are trained; or `pixel`, at each pixel where along its ray a splat is
+   * What splats are ordered by: `center`, the depth of their centres, as most scenes are trained; `distance`, that of their centres from the eye, which turning the
+   * camera does not change (frames with other depths take `center`); or `pixel`, at each pixel where along its ray a splat is
    * densest. That does not pop when the camera turns, is what scenes of StopThePop and its successors are trained with, and takes the rasterizer `tiles`.
    * Its code is loaded with the first frame that asks for it: until then splats are ordered by `center`.
    */
-  readonly order: 'center' | 'pixel';
+  readonly order: 'center' | 'pixel' | 'distance';
   /** With `order: 'pixel'`: splats of a pixel that are sorted at once. One that is listed later than that is blended late. */
   readonly orderWindow: 16 | 32;
   /** Spherical harmonics above this degree are ignored. */
@@ -128,7 +129,7 @@ const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>
   threads: ['auto', 'parallel', 'serial'],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
   depthKeyBits: [16, 24, 32],
-  order: ['center', 'pixel'],
+  order: ['center', 'pixel', 'distance'],
   orderWindow: [16, 32],
   shDegree: [0, 1, 2, 3],
 };

@@ -238,7 +238,10 @@ export class UncheckedViewpoint {
     const order = this.#orderOf(asked);
     this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
-    const levers = depth && !order ? { ...asked, depthKeyBits: 32 as const } : asked;
+    const isExact = (depth && !order) || asked.order === 'distance';
+    const levers = isExact
+      ? { ...asked, depthKeyBits: 32 as const, ...(depth && { order: 'center' as const }) }
+      : asked;
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
     const drawn = scaled(camera, levers.resolutionScale * this.pixelShare);
     depth?.prepare(camera, drawn, rasterizer.name, auxiliary);

@@ -31,7 +31,7 @@ export interface AttributeGrammar<T> {
 }
 
 const NUMBER_WITH_UNIT = /^([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)([a-z%]*)$/i;
-const METRES_PER_UNIT: Readonly<Record<string, number>> = { '': 1, m: 1, cm: 1e-2, mm: 1e-3 };
+export const METRES_PER_UNIT: Readonly<Record<string, number>> = { '': 1, m: 1, cm: 1e-2, mm: 1e-3 };
 const RADIANS_PER_UNIT: Readonly<Record<string, number>> = { deg: Math.PI / 180, rad: 1 };
 
 interface Quantity {
@@ -39,7 +39,7 @@ interface Quantity {
   readonly unit: string;
 }
 
-function parseQuantity(term: string): Quantity | null {
+export function parseQuantity(term: string): Quantity | null {
   const match = NUMBER_WITH_UNIT.exec(term);
   const value = match ? Number(match[1]) : NaN;
   return match && Number.isFinite(value) ? { value, unit: match[2].toLowerCase() } : null;
@@ -100,26 +100,6 @@ export function parsePoint(text: string): readonly [x: number, y: number, z: num
   const isPoint = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' && rest.length === 0;
   return isPoint ? [x, y, z] : null;
 }
-
-/** A length above 0 with a unit, such as `1.6m` or `37cm`: meters, or null. */
-const parseExtent = (text: string): number | null => {
-  const quantity = parseQuantity(text.trim().toLowerCase());
-  const meters = quantity === null || quantity.unit === '' ? undefined : METRES_PER_UNIT[quantity.unit];
-  return meters !== undefined && quantity!.value > 0 ? quantity!.value * meters : null;
-};
-
-export const lengthGrammar = (fallback: string): AttributeGrammar<number> => ({
-  expected: 'a length above 0 with m, cm or mm',
-  fallback,
-  parse: parseExtent,
-});
-
-/** The same, or undefined: what is not written. */
-export const optionalLengthGrammar: AttributeGrammar<number | undefined> = {
-  expected: 'a length above 0 with m, cm or mm, such as 1m or 37cm',
-  fallback: '',
-  parse: (text) => (text === '' ? undefined : parseExtent(text)),
-};
 
 const ORBIT_FORM =
   '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %; "auto" for each, or left out from the end';

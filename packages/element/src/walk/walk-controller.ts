@@ -1,6 +1,8 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
+import { readAttribute } from '../camera/grammar.js';
+import { lengthGrammar, optionalLengthGrammar } from '../camera/lengths.js';
 import { eyeOfPose, type ViewerFrame } from '../camera/orbit.js';
 import type { ScenePoint } from '../camera/values.js';
 import type { AnnouncerController } from '../controllers/announcer-controller.js';
@@ -155,10 +157,10 @@ export class WalkController implements ReactiveController, Mover {
 
   /** Puts the camera's eye over the feet. */
   #follow(): void {
-    const { camera, attributes } = this.#of;
+    const { camera } = this.#of;
     const { at, eyeFloor } = this.#walker!;
-    const unit = attributes.unit ?? 1;
-    camera.walkTo([at[0] / unit, (eyeFloor + attributes.eyeHeight) / unit, at[2] / unit]);
+    const { unit = 1, eyeHeight } = this.#settings();
+    camera.walkTo([at[0] / unit, (eyeFloor + eyeHeight) / unit, at[2] / unit]);
     this.#of.requestFrame();
   }
 
@@ -172,9 +174,9 @@ export class WalkController implements ReactiveController, Mover {
 
   /** Has the floor of the scene made, or fetched, unless it is. */
   #ask(): void {
-    const { walkable: request, attributes, camera, frame, services } = this.#of;
+    const { walkable: request, camera, frame, services } = this.#of;
     if (request === null) return;
-    const { walkMap, eyeHeight, unit } = attributes;
+    const { walkMap, eyeHeight, unit } = this.#settings();
     const key = JSON.stringify([request.url, walkMap, eyeHeight, unit, frame]);
     if (key === this.#askedFor) return;
     this.#forget();
@@ -241,7 +243,7 @@ export class WalkController implements ReactiveController, Mover {
   readonly #onClick = ({ clientX, clientY }: MouseEvent): void => {
     const walker = this.#walker;
     if (walker === undefined) return;
-    const unit = this.#of.attributes.unit ?? 1;
+    const { unit = 1 } = this.#settings();
     this.#of.positionFromPoint(clientX, clientY).then(
       (point) => {
         if (point === null || this.#walker !== walker) return;
@@ -281,6 +283,17 @@ export class WalkController implements ReactiveController, Mover {
       turn -= beyond(pad.axes[2]);
     }
     return [right, forward, turn];
+  }
+
+  /** What the attributes say, in meters. */
+  #settings(): { walkMap: string; eyeHeight: number; unit: number | undefined } {
+    const { walkMap, eyeHeight, unit } = this.#of.attributes;
+    const warn = (sentence: string): void => this.#of.warn(sentence);
+    return {
+      walkMap: walkMap?.trim() || 'auto',
+      eyeHeight: readAttribute('eye-height', eyeHeight, lengthGrammar('1.6m'), warn),
+      unit: readAttribute('unit', unit, optionalLengthGrammar, warn),
+    };
   }
 
   #word(key: WalkWord): string {

@@ -17,6 +17,7 @@ export class GlLoaded extends LoadedGaussians {
   override readonly renderer = 'webgl';
   readonly lease: GlLease;
   readonly frames: GlRenderer;
+  readonly textures: GlGaussians;
   /** [N, 3] relative to the scene's origin */
   readonly positions: Float32Array;
   /** Of their largest sections; [N] */
@@ -26,6 +27,7 @@ export class GlLoaded extends LoadedGaussians {
   private constructor(
     lease: GlLease,
     frames: GlRenderer,
+    textures: GlGaussians,
     gaussians: OwnedGaussians,
     { packed, bounds, warnings = [], hasMeshes = false }: LoadedScene,
     spawn: () => Worker,
@@ -33,6 +35,7 @@ export class GlLoaded extends LoadedGaussians {
     super(lease, gaussians, bounds, 1, { warnings: hasMeshes ? [...warnings, NO_MESHES] : warnings });
     this.lease = lease;
     this.frames = frames;
+    this.textures = textures;
     this.spawn = spawn;
     this.positions = positionsIn(packed.geometry);
     this.areas = areasIn(packed.geometry);
@@ -58,7 +61,7 @@ export class GlLoaded extends LoadedGaussians {
       signal.throwIfAborted();
       frames = new GlRenderer(lease.gl, textures);
       const gaussians = { ...textures.facts, pages: [], version: 0, byteLength, destroy };
-      return new GlLoaded(lease, frames, gaussians, scene, spawn);
+      return new GlLoaded(lease, frames, textures, gaussians, scene, spawn);
     } catch (error) {
       destroy();
       throw error;

@@ -1,5 +1,6 @@
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import {
+  distanceView,
   isSameView,
   orderView,
   OverdrawLimit,
@@ -166,7 +167,8 @@ export class GlPainter implements Painter {
   }
 
   #viewOf({ camera }: CanvasFrame): OrderView {
-    return orderView(camera, this.#scene.gaussians.origin);
+    const viewOf = this.#rendering.order === 'distance' ? distanceView : orderView;
+    return viewOf(camera, this.#scene.gaussians.origin);
   }
 
   #ask(view: OrderView): void {

@@ -94,6 +94,8 @@ export function acquireGl(): GlLease | undefined {
 function start(): GlSession | undefined {
   const gl = document.createElement('canvas').getContext('webgl2', {
     alpha: true,
+    // What a headset shows cannot be drawn on another GPU.
+    xrCompatible: document.querySelector('gaussian-splat:is([vr],[ar])') !== null,
     antialias: false,
     depth: false,
     stencil: false,

@@ -141,22 +141,25 @@ export class SplatOrder {
     return count;
   }
 
-  /** The same with the squared distance in place of the depth. Coordinates that are no numbers come last. */
+  /** The same with the squared distance in place of the depth. */
   #findDistances([x, y, z]: Vector3): number {
     const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
     const distances = new Float32Array(keys.buffer);
     low.fill(0);
     high.fill(0);
+    let count = 0;
     for (let i = 0, at = 0; i < keys.length; i++, at += 3) {
       const dx = positions[at] - x;
       const dy = positions[at + 1] - y;
       const dz = positions[at + 2] - z;
-      distances[i] = dx * dx + dy * dy + dz * dz;
+      const squared = dx * dx + dy * dy + dz * dz;
+      if (!(squared < Infinity)) continue;
+      distances[i] = squared;
       low[keys[i] & 0xffff]++;
       high[keys[i] >>> 16]++;
-      listed[i] = i;
+      listed[count++] = i;
     }
-    return keys.length;
+    return count;
   }
 }
 

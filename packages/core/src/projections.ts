@@ -1,0 +1,116 @@
+/** Cameras from the matrices of hosts: a module of its own, since few pages have a host. */
+import { describeCamera as describe, failCamera as fail, validateCamera, type Camera } from './camera.js';
+import { cross, dot, type Vector3 } from './vector.js';
+
+/** How a host's projection writes depth. */
+export interface ProjectionOptions {
+  /** Image size in pixels. */
+  readonly width: number;
+  readonly height: number;
+  /** Range of depth behind the division by w: `0..1` as WebGPU has it, or `-1..1` as OpenGL does. Default: `0..1`. */
+  readonly clipDepth?: '0..1' | '-1..1';
+}
+
+/** Of the distance between the planes: where the near plane of parallel rays is put that lies at the eye or behind it. */
+const LEAST_NEAR = 1e-3;
+
+/**
+ * A camera from the two matrices of a host such as three.js, glMatrix or WebXR: x right, y up, z backward, clip space as GPUs have it.
+ *
+ * ```ts
+ * const camera = cameraFromProjection(camera3.matrixWorldInverse.elements, camera3.projectionMatrix.elements, { width, height });
+ * ```
+ * @param view world to camera, 16 numbers, column-major
+ * @param projection perspective or orthographic, 16 numbers, column-major; off-centre and reversed ones, and those without a far plane, too
+ * @throws GaussianSplatError `argument/camera` for a projection with skew, or one that is neither.
+ */
+export function cameraFromProjection(
+  view: ArrayLike<number>,
+  projection: ArrayLike<number>,
+  { width, height, clipDepth = '0..1' }: ProjectionOptions,
+): Camera {
+  const p = projection;
+  const isMatrix = (m: ArrayLike<number>): boolean =>
+    m?.length === 16 && Array.prototype.every.call(m, Number.isFinite);
+  if (!isMatrix(view)) fail('view', '16 finite numbers, column-major', describe(view));
+  if (!isMatrix(p)) fail('projection', '16 finite numbers, column-major', describe(p));
+  const orthographic = p[11] === 0 && p[15] === 1;
+  if (!orthographic && !(p[11] === -1 && p[15] === 0))
+    fail('projection', 'a last row of 0, 0, -1, 0 or 0, 0, 0, 1', describe([p[3], p[7], p[11], p[15]]));
+  const skew = Math.max(...[1, 2, 3, 4, 6, 7].map((k) => Math.abs(p[k])));
+  if (skew !== 0) fail('projection', 'no skew: 0 beside the diagonal and the centre', describe(Array.from(p)));
+  const [x, y] = orthographic ? [p[12], -p[13]] : [-p[8], p[9]];
+  const planes = (clipDepth === '0..1' ? [0, 1] : [-1, 1]).map((depth) =>
+    orthographic ? (p[14] - depth) / p[10] : p[14] / (p[10] + depth),
+  );
+  // A projection without a far plane divides by nothing, or next to it.
+  const distances = planes.map((plane) => (Number.isFinite(plane) && (orthographic || plane > 0) ? plane : Infinity));
+  const [nearest, far] = [Math.min(...distances), Math.max(...distances)];
+  const back = orthographic && nearest <= 0 ? LEAST_NEAR * (far - nearest) - nearest : 0;
+  const flip = [1, -1, -1, 1];
+  const worldToCamera = Float64Array.from(
+    { length: 16 },
+    (_, k) => flip[Math.floor(k / 4)] * view[4 * (k % 4) + Math.floor(k / 4)],
+  );
+  worldToCamera[11] += back;
+  const camera: Camera = {
+    ...{ width, height, worldToCamera },
+    fx: (p[0] * width) / 2,
+    fy: (p[5] * height) / 2,
+    cx: (width * (1 + x)) / 2,
+    cy: (height * (1 + y)) / 2,
+    near: nearest + back,
+    far: far + back,
+    ...(orthographic && { orthographic }),
+  };
+  validateCamera(camera);
+  return camera;
+}
+
+/**
+ * A camera from the one matrix that maps give: from the coordinates of a scene to clip space, perspective.
+ * @param matrix 16 numbers, column-major; it may scale
+ * @throws GaussianSplatError `argument/camera` for a matrix with skew, a mirrored one, and one that is no perspective.
+ */
+export function cameraFromClip(
+  matrix: ArrayLike<number>,
+  { width, height, clipDepth = '0..1' }: ProjectionOptions,
+): Camera {
+  if (matrix?.length !== 16 || !Array.prototype.every.call(matrix, Number.isFinite))
+    fail('matrix', '16 finite numbers, column-major', describe(matrix));
+  const [x, y, z, w] = [0, 1, 2, 3].map((row): Vector3 => [matrix[row], matrix[4 + row], matrix[8 + row]]);
+  const squared = dot(w, w);
+  if (squared === 0) fail('matrix', 'a perspective', describe(Array.from(matrix)));
+  // Rows of clip space are those of the camera: each is a multiple of one, and of the depth's.
+  const axis = (row: Vector3, number: number): { focal: number; shift: number; row: number[] } => {
+    const shift = dot(row, w) / squared;
+    const own = [0, 1, 2].map((k) => row[k] - shift * w[k]) as unknown as Vector3;
+    const focal = Math.sqrt(dot(own, own) / squared);
+    return { focal, shift, row: [...own, matrix[12 + number] - shift * matrix[15]].map((value) => value / focal) };
+  };
+  const [right, up] = [axis(x, 0), axis(y, 1)];
+  const down = up.row.map((value) => -value);
+  const [r, d] = [right.row, down].map(([a, b, c]): Vector3 => [a, b, c]);
+  if (Math.abs(dot(r, d)) > SKEW * squared) fail('matrix', 'no skew', describe(Array.from(matrix)));
+  if (!(dot(cross(r, d), w) > 0)) fail('matrix', 'one that mirrors nothing', describe(Array.from(matrix)));
+  const depth = dot(z, w) / squared;
+  const offset = matrix[14] - depth * matrix[15];
+  const planes = (clipDepth === '0..1' ? [0, 1] : [-1, 1])
+    .map((plane) => offset / (plane - depth))
+    .map((plane) => (Number.isFinite(plane) && plane > 0 ? plane : Infinity));
+  const camera: Camera = {
+    ...{ width, height },
+    worldToCamera: Float64Array.from([...right.row, ...down, ...w, matrix[15], 0, 0, 0, 1]),
+    fx: (right.focal * width) / 2,
+    fy: (up.focal * height) / 2,
+    cx: (width * (1 + right.shift)) / 2,
+    cy: (height * (1 - up.shift)) / 2,
+    near: Math.min(...planes),
+    far: Math.max(...planes),
+  };
+  validateCamera(camera);
+  return camera;
+}
+
+/** Cosine of the angle between the axes of a picture up to which that is none: matrices of maps are rounded. */
+const SKEW = 1e-3;

@@ -1,0 +1,76 @@
+import { css } from 'lit';
+import type { Stage } from '../stage.js';
+import { languageOf } from '../words.js';
+import { WORDS } from './xr-offer.js';
+
+export const AR_STYLES = css`
+  .ar-overlay {
+    position: absolute;
+    inset: 0;
+    display: none;
+    z-index: 3;
+    pointer-events: none;
+  }
+  .ar-overlay.shown {
+    display: block;
+  }
+  .ar-overlay button,
+  .ar-overlay ::slotted(button) {
+    pointer-events: auto;
+  }
+  .ar-overlay button {
+    position: absolute;
+    inset-block-start: 16px;
+    inset-inline-end: 16px;
+    font: inherit;
+    padding: 8px 14px;
+    border: 0;
+    border-radius: 999px;
+    color: rgb(255 255 255);
+    background: rgb(0 0 0 / 0.7);
+  }
+`;
+
+/** What lies over the room on a phone: a button to leave, and the author's prompt until the object stands. */
+export class ArOverlay {
+  readonly root: HTMLElement;
+  readonly #stage: Stage;
+  readonly #prompt: HTMLSlotElement;
+  readonly #exit: HTMLButtonElement;
+  onExit: () => void = () => undefined;
+
+  constructor(element: HTMLElement, stage: Stage) {
+    const { ownerDocument: page } = element;
+    this.#stage = stage;
+    this.root = page.createElement('div');
+    this.root.className = 'ar-overlay';
+    this.#prompt = Object.assign(page.createElement('slot'), { name: 'ar-prompt' });
+    const slot = Object.assign(page.createElement('slot'), { name: 'exit-ar-button' });
+    this.#exit = Object.assign(page.createElement('button'), { type: 'button' });
+    this.#exit.setAttribute('part', 'exit-ar-button');
+    slot.append(this.#exit);
+    slot.addEventListener('click', () => this.onExit());
+    // A touch of the button moves no object.
+    this.root.addEventListener('beforexrselect', (event) => {
+      if (event.composedPath().includes(slot)) event.preventDefault();
+    });
+    this.root.append(this.#prompt, slot);
+    element.shadowRoot!.append(this.root);
+  }
+
+  show(): void {
+    const { strings } = this.#stage;
+    this.#exit.textContent = strings['exit-ar'] ?? WORDS['exit-ar'];
+    this.#exit.lang = languageOf(strings) ?? '';
+    this.#prompt.hidden = false;
+    this.root.classList.add('shown');
+  }
+
+  placed(): void {
+    this.#prompt.hidden = true;
+  }
+
+  hide(): void {
+    this.root.classList.remove('shown');
+  }
+}

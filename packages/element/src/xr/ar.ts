@@ -1,0 +1,247 @@
+import { multiply, type Vector3 } from '@gaussian-splat/core';
+import type { ReactiveControllerHost } from 'lit';
+import { toViewer } from '../camera/orbit.js';
+import type { Stage } from '../stage.js';
+import { adoptStyles } from '../styles.js';
+import { AR_STYLES, ArOverlay } from './ar-overlay.js';
+import { MarkerSplats } from './marker-splats.js';
+import { SimplifiedModel } from './simplified-model.js';
+import { metersOf, unitOf } from './vr.js';
+import type { XrFrame, XrHit, XrAnchor, XrHitTestSource, XrInput, XrPose } from './webxr.js';
+import { XrOffer, type XrKind, type XrStarted } from './xr-offer.js';
+import type { XrGuide } from './xr-session.js';
+
+/** Sizes between which an object is at first, meters. */
+const [SMALLEST, LARGEST] = [0.5, 1];
+/** Scales that fingers reach. */
+const [LEAST_SCALE, MOST_SCALE] = [0.05, 20];
+/** Near true size it stays there. */
+const SNAP = 0.05;
+/** How far under the middle of the view the floor is looked for, radians. */
+const DOWN = (20 * Math.PI) / 180;
+/** Of the subject's splats, the share that lies below the floor. */
+const BELOW = 0.01;
+/** Of the object's radius, that of the disc under it. */
+const DISC = 0.8;
+
+/** Where the subject of a scene stands on its floor. */
+interface Footprint {
+  /** Middle of its base, viewer space, units. */
+  readonly base: Vector3;
+  readonly height: number;
+  readonly radius: number;
+  /** Splats that are not of it are left out: positions, with NaN for those. */
+  readonly positions: Float32Array;
+}
+
+/** The subject among splats: what lies within the ball that framing has found, but for the lowest hundredth. */
+export function footprintOf(stage: Stage, positions: Float32Array, origin: Vector3): Footprint {
+  const { center, radius } = stage.camera.bounds;
+  const { frame } = stage;
+  const kept = positions.slice();
+  const heights: number[] = [];
+  for (let at = 0; at < positions.length; at += 3) {
+    const p: Vector3 = [positions[at] + origin[0], positions[at + 1] + origin[1], positions[at + 2] + origin[2]];
+    const away = Math.hypot(p[0] - center[0], p[1] - center[1], p[2] - center[2]);
+    if (away <= radius) heights.push(toViewer(frame, p)[1]);
+    else kept.fill(NaN, at, at + 3);
+  }
+  const sorted = Float64Array.from(heights).sort();
+  const low = sorted[Math.floor(BELOW * sorted.length)] ?? 0;
+  const high = sorted[Math.floor((1 - BELOW) * (sorted.length - 1))] ?? 0;
+  const [x, , z] = toViewer(frame, center);
+  return { base: [x, low, z], height: high - low, radius, positions: kept };
+}
+
+/** Offers AR: WebXR where there is some, else the author's model on iPhones. */
+export function offerAr(element: ReactiveControllerHost & HTMLElement, stage: Stage, place: HTMLElement): XrOffer {
+  adoptStyles(element.shadowRoot!, AR_STYLES);
+  const overlay = new ArOverlay(element, stage);
+  const offer = new XrOffer(element, stage, place, arKind(stage, overlay));
+  overlay.onExit = () => offer.end();
+  element.addController(new SimplifiedModel(element, stage, place, offer));
+  return offer;
+}
+
+const arKind = (stage: Stage, overlay: ArOverlay): XrKind => ({
+  ...{ mode: 'immersive-ar', name: 'ar', word: 'ar' },
+  isWanted: () => stage.attributes.ar && /(^|\s)webxr(\s|$)/.test(stage.attributes.arModes?.trim() || 'webxr'),
+  options: () => ({
+    requiredFeatures: ['hit-test'],
+    optionalFeatures: ['anchors', 'local-floor', 'dom-overlay'],
+    domOverlay: { root: overlay.root },
+  }),
+  spaces: ['local-floor', 'local'],
+  guide: (started) => new ArGuide(stage, started, overlay),
+});
+
+/** Puts the subject where the view meets a surface of the room, and lets fingers move, turn and scale it. */
+class ArGuide implements XrGuide {
+  readonly background = [0, 0, 0, 0] as const;
+  readonly #stage: Stage;
+  readonly #of: XrStarted;
+  readonly #overlay: ArOverlay;
+  readonly #disc: MarkerSplats;
+  readonly #unit: number;
+  #source: XrHitTestSource | undefined;
+  #footprint: Footprint | undefined;
+  #at: Vector3 | undefined;
+  #turn = 0;
+  #scale = 1;
+  #anchor: XrAnchor | undefined;
+  #isAnchored = false;
+  #fingers: Fingers | undefined;
+
+  constructor(stage: Stage, of: XrStarted, overlay: ArOverlay) {
+    this.#stage = stage;
+    this.#of = of;
+    this.#overlay = overlay;
+    this.#disc = new MarkerSplats(of.gl, 'disc', stage.services.sceneLoader, of.signal);
+    const unit = unitOf(stage);
+    if (unit === undefined && stage.attributes.arScale === 'fixed')
+      stage.warn(
+        '<gaussian-splat> ar-scale="fixed": expected the attribute unit, such as unit="1m"; the object is 0.5 to 1 m large.',
+      );
+    this.#unit = unit ?? 1;
+    overlay.show();
+    of.signal.addEventListener('abort', () => {
+      overlay.hide();
+      this.#source?.cancel();
+    });
+    void this.#listen();
+  }
+
+  place(frame: XrFrame, pose: XrPose): Float64Array | null {
+    const { loop } = this.#of.offer;
+    const found = loop?.scene;
+    if (!found) return null;
+    if (!this.#footprint) {
+      this.#footprint = footprintOf(this.#stage, found.positions, found.origin);
+      loop.crop(this.#footprint.positions);
+      this.#scale = this.#firstScale(this.#footprint);
+    }
+    if (!this.#at) this.#look(frame, pose);
+    if (!this.#at) return null;
+    this.#follow(frame);
+    this.#touch(frame);
+    return this.#matrix(this.#at, this.#footprint);
+  }
+
+  drawBelow(
+    camera: Parameters<NonNullable<XrGuide['drawBelow']>>[0],
+    at: Parameters<NonNullable<XrGuide['drawBelow']>>[1],
+  ): void {
+    if (!this.#at || !this.#footprint || this.#isWall) return;
+    this.#disc.draw(camera, at, this.#at, DISC * this.#footprint.radius * this.#scale * this.#unit);
+  }
+
+  get #isWall(): boolean {
+    return this.#stage.attributes.arPlacement === 'wall';
+  }
+
+  get #isFixed(): boolean {
+    const { attributes } = this.#stage;
+    return attributes.arScale === 'fixed' && Boolean(attributes.unit);
+  }
+
+  #firstScale({ radius, height }: Footprint): number {
+    if (this.#isFixed) return 1;
+    const size = Math.max(2 * radius, height) * this.#unit;
+    return Math.min(LARGEST, Math.max(SMALLEST, size)) / size;
+  }
+
+  async #listen(): Promise<void> {
+    const { session, signal } = this.#of;
+    const space = await session.requestReferenceSpace('viewer');
+    const { XRRay } = globalThis as unknown as { XRRay?: new (origin: object, direction: object) => unknown };
+    const down = this.#isWall ? 0 : DOWN;
+    const offsetRay =
+      XRRay && new XRRay({ x: 0, y: 0, z: 0, w: 1 }, { x: 0, y: -Math.sin(down), z: -Math.cos(down), w: 0 });
+    const source = await session.requestHitTestSource?.({ space, ...(offsetRay ? { offsetRay } : {}) });
+    if (signal.aborted) source?.cancel();
+    else this.#source = source;
+  }
+
+  /** The first surface that the view meets. */
+  #look(frame: XrFrame, pose: XrPose): void {
+    const [hit] = (this.#source && frame.getHitTestResults?.(this.#source)) ?? [];
+    const at = hit?.getPose(this.#of.space)?.transform;
+    if (!at) return;
+    const { x, y, z } = at.position;
+    this.#at = [x, y, z];
+    const viewer = pose.transform.position;
+    const [towardX, towardZ] = this.#isWall ? [at.matrix[4], at.matrix[6]] : [viewer.x - x, viewer.z - z];
+    // Its front, the side of +z, to the person or away from the wall.
+    this.#turn = Math.atan2(towardX, towardZ);
+    this.#source?.cancel();
+    this.#source = undefined;
+    this.#overlay.placed();
+    this.#of.offer.status('object-placed');
+    void this.#holdOn(hit);
+  }
+
+  async #holdOn(hit: XrHit): Promise<void> {
+    const anchor = await hit.createAnchor?.().catch(() => undefined);
+    this.#anchor = anchor;
+    this.#isAnchored = anchor !== undefined;
+  }
+
+  /** The room is known better from frame to frame. */
+  #follow(frame: XrFrame): void {
+    if (!this.#isAnchored || !this.#anchor) return;
+    const place = frame.getPose(this.#anchor.anchorSpace, this.#of.space)?.transform.position;
+    if (place) this.#at = [place.x, place.y, place.z];
+  }
+
+  /** One finger moves the object on its plane, two turn and scale it. */
+  #touch(frame: XrFrame): void {
+    const touched = [...frame.session.inputSources].flatMap((input) => this.#onPlane(frame, input) ?? []);
+    const fingers = touched.length > 0 ? fingersOf(touched) : undefined;
+    const before = this.#fingers;
+    this.#fingers = fingers;
+    if (!fingers || !before || fingers.count !== before.count) return;
+    this.#isAnchored = false;
+    const [x, y, z] = this.#at!;
+    this.#at = [x + fingers.x - before.x, y, z + fingers.z - before.z];
+    if (fingers.count < 2) return;
+    this.#turn -= fingers.angle - before.angle;
+    if (this.#isFixed || before.apart === 0) return;
+    this.#scale = Math.min(MOST_SCALE, Math.max(LEAST_SCALE, (this.#scale * fingers.apart) / before.apart));
+    if (this.#stage.attributes.unit && Math.abs(this.#scale - 1) < SNAP) this.#scale = 1;
+  }
+
+  #onPlane(frame: XrFrame, input: XrInput & { targetRayMode?: string }): { x: number; z: number } | undefined {
+    if (input.targetRayMode !== 'screen') return undefined;
+    const m = frame.getPose(input.targetRaySpace, this.#of.space)?.transform.matrix;
+    if (!m) return undefined;
+    const far = (m[13] - this.#at![1]) / m[9];
+    return far > 0 ? { x: m[12] - far * m[8], z: m[14] - far * m[10] } : undefined;
+  }
+
+  #matrix([x, y, z]: Vector3, { base, height, radius }: Footprint): Float64Array {
+    const size = this.#scale;
+    const [sin, cos] = [size * Math.sin(this.#turn), size * Math.cos(this.#turn)];
+    const meters = metersOf(this.#stage.frame, this.#unit);
+    // The middle of its base is put there; on a wall, of its back.
+    const [lift, back] = this.#isWall ? [height / 2, -radius] : [0, 0];
+    const [px, py, pz] = [base[0], base[1] + lift, base[2] + back].map((value) => value * this.#unit);
+    const turn = [cos, 0, sin, x, 0, size, 0, y, -sin, 0, cos, z, 0, 0, 0, 1];
+    const move = [1, 0, 0, -px, 0, 1, 0, -py, 0, 0, 1, -pz, 0, 0, 0, 1];
+    return Float64Array.from(multiply(multiply(turn, move), meters));
+  }
+}
+
+interface Fingers {
+  readonly count: number;
+  readonly x: number;
+  readonly z: number;
+  readonly angle: number;
+  readonly apart: number;
+}
+
+function fingersOf(places: readonly { readonly x: number; readonly z: number }[]): Fingers {
+  const [a, b = a] = places;
+  const [dx, dz] = [b.x - a.x, b.z - a.z];
+  const middle = { x: (a.x + b.x) / 2, z: (a.z + b.z) / 2 };
+  return { count: Math.min(2, places.length), ...middle, angle: Math.atan2(dz, dx), apart: Math.hypot(dx, dz) };
+}

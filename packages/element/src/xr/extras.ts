@@ -1,0 +1,109 @@
+/** Loaded where an element has one of the attributes `vr`, `ar` and `measure`. */
+import { css, type ReactiveControllerHost } from 'lit';
+import { Lazy } from '../lazy.js';
+import type { Stage } from '../stage.js';
+import { adoptStyles } from '../styles.js';
+import type { XrOffer } from './xr-offer.js';
+
+const STYLES = css`
+  .extras {
+    position: absolute;
+    inset-block-end: 8px;
+    inset-inline-start: 8px;
+    display: flex;
+    flex-wrap: wrap;
+    gap: 8px;
+    z-index: 2;
+  }
+  .extras:empty {
+    display: none;
+  }
+  .extras button {
+    font: inherit;
+    padding: 8px 14px;
+    border: 0;
+    border-radius: 999px;
+    cursor: pointer;
+    background: var(--interaction-prompt-background, rgb(0 0 0 / 0.7));
+    color: var(--interaction-prompt-color, rgb(255 255 255));
+  }
+  .extras button[aria-pressed='true'] {
+    outline: 2px solid currentcolor;
+  }
+`;
+
+/** What elements have besides while they have `vr` or `ar`: present once their code is. */
+export interface ImmersiveMethods {
+  /** Starts VR, as a click on its button does: call it in the handler of a click, with nothing awaited before it. Rejects with GaussianSplatError `unsupported/xr`, `argument/activation`. */
+  activateVR?(): Promise<void>;
+  /** The same for AR. */
+  activateAR?(): Promise<void>;
+  /** Leaves VR or AR. */
+  exitXR?(): void;
+  /** Whether VR can be started now. */
+  readonly canActivateVR?: boolean;
+  /** Whether AR can be started now. */
+  readonly canActivateAR?: boolean;
+}
+
+export class Extras {
+  readonly vr: Lazy<XrOffer>;
+  readonly ar: Lazy<XrOffer>;
+  readonly measure: Lazy<unknown>;
+
+  constructor(element: ReactiveControllerHost & HTMLElement, stage: Stage) {
+    adoptStyles(element.shadowRoot!, STYLES);
+    const place = element.ownerDocument.createElement('div');
+    place.className = 'extras';
+    stage.surface?.after(place);
+    const update = (): void => element.requestUpdate();
+    this.vr = new Lazy(
+      'the code for VR',
+      async () => {
+        const [{ XrOffer }, { vrKind }] = await Promise.all([import('./xr-offer.js'), import('./vr.js')]);
+        return new XrOffer(element, stage, place, vrKind(stage));
+      },
+      update,
+    );
+    this.ar = new Lazy(
+      'the code for AR',
+      async () => {
+        const { offerAr } = await import('./ar.js');
+        return offerAr(element, stage, place);
+      },
+      update,
+    );
+    this.measure = new Lazy(
+      'the code for measuring',
+      async () => {
+        const [{ Measure }] = await Promise.all([import('./measure.js'), stage.behaviours.announcer.get()]);
+        return new Measure(element, stage, place);
+      },
+      update,
+    );
+    const warn = ({ message }: Error): void => stage.warn(message);
+    const find = ({ attributes }: Stage): void => {
+      if (attributes.vr) this.vr.want(warn);
+      if (attributes.ar) this.ar.want(warn);
+      if (attributes.measure) this.measure.want(warn);
+    };
+    const offerOf = (name: 'vr' | 'ar'): XrOffer => {
+      const { value } = this[name];
+      if (!value) throw new TypeError(`the attribute ${name} is not set, or its code is not there yet`);
+      return value;
+    };
+    Object.defineProperties(element, {
+      activateVR: { value: () => offerOf('vr').activate() },
+      activateAR: { value: () => offerOf('ar').activate() },
+      exitXR: {
+        value: () => {
+          this.vr.value?.end();
+          this.ar.value?.end();
+        },
+      },
+      canActivateVR: { get: () => this.vr.value?.canActivate ?? false },
+      canActivateAR: { get: () => this.ar.value?.canActivate ?? false },
+    });
+    element.addController({ hostUpdated: () => find(stage) });
+  }
+}

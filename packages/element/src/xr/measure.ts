@@ -1,0 +1,244 @@
+import { css, type ReactiveController, type ReactiveControllerHost } from 'lit';
+import { project } from '../camera/projection.js';
+import { toScene } from '../camera/orbit.js';
+import type { ScenePoint } from '../camera/values.js';
+import type { MeasureDetail } from '../events.js';
+import type { Stage } from '../stage.js';
+import { adoptStyles } from '../styles.js';
+import { languageOf, type ExtraWord } from '../words.js';
+import { unitOf } from './vr.js';
+import { WORDS } from './xr-offer.js';
+
+const STYLES = css`
+  .ruler {
+    position: absolute;
+    inset: 0;
+    width: 100%;
+    height: 100%;
+    pointer-events: none;
+    overflow: hidden;
+    color: var(--measure-color, rgb(255 255 255));
+  }
+  .ruler line {
+    stroke: currentcolor;
+    stroke-width: 2.5;
+    paint-order: stroke;
+    filter: drop-shadow(0 0 1px rgb(0 0 0));
+  }
+  .ruler circle {
+    fill: none;
+    stroke: currentcolor;
+    stroke-width: 2;
+    filter: drop-shadow(0 0 1px rgb(0 0 0));
+  }
+  .ruler-label {
+    position: absolute;
+    padding: 2px 8px;
+    border-radius: 6px;
+    pointer-events: none;
+    font:
+      600 14px / 1.4 system-ui,
+      sans-serif;
+    font-variant-numeric: tabular-nums;
+    white-space: nowrap;
+    color: var(--measure-color, rgb(255 255 255));
+    background: var(--measure-background, rgb(0 0 0 / 0.75));
+    transform: translate(-50%, -50%);
+  }
+`;
+const SVG = 'http://www.w3.org/2000/svg';
+/** A pointer that moves farther between its press and its release drags, CSS pixels. */
+const DRAG = 5;
+/** Digits of a length. */
+const DIGITS = 3;
+
+/** A ruler: two ends on surfaces of the scene, a line, and its length with what it may be off by. */
+export class Measure implements ReactiveController {
+  readonly #element: ReactiveControllerHost & HTMLElement;
+  readonly #stage: Stage;
+  readonly #place: HTMLElement;
+  readonly #button: HTMLButtonElement;
+  readonly #drawing: SVGSVGElement;
+  readonly #label: HTMLElement;
+  #ends: readonly ScenePoint[] = [];
+  #listening: AbortController | undefined;
+  #pressed: readonly [number, number] | undefined;
+  #hasKeyboard = false;
+
+  constructor(element: ReactiveControllerHost & HTMLElement, stage: Stage, place: HTMLElement) {
+    this.#element = element;
+    this.#stage = stage;
+    this.#place = place;
+    adoptStyles(element.shadowRoot!, STYLES);
+    const page = element.ownerDocument;
+    this.#button = Object.assign(page.createElement('button'), { type: 'button' });
+    this.#button.setAttribute('part', 'measure-button');
+    this.#button.addEventListener('click', () => this.#toggle());
+    this.#drawing = page.createElementNS(SVG, 'svg');
+    this.#drawing.setAttribute('class', 'ruler');
+    this.#drawing.setAttribute('aria-hidden', 'true');
+    this.#label = page.createElement('div');
+    this.#label.className = 'ruler-label';
+    this.#label.setAttribute('part', 'measure-label');
+    this.#label.setAttribute('aria-hidden', 'true');
+    element.addController(this);
+  }
+
+  hostUpdated(): void {
+    const { attributes, isOnShow, strings } = this.#stage;
+    if (!attributes.measure || !isOnShow) return this.#stop();
+    this.#button.textContent = this.#word('measure');
+    this.#button.lang = languageOf(strings) ?? '';
+    this.#button.setAttribute('aria-pressed', String(this.#listening !== undefined));
+    if (!this.#button.isConnected) this.#place.append(this.#button);
+  }
+
+  hostDisconnected(): void {
+    this.#stop();
+  }
+
+  #word(key: ExtraWord): string {
+    return this.#stage.strings[key] ?? WORDS[key];
+  }
+
+  #say(text: string): void {
+    this.#stage.behaviours.announcer.value?.say(text);
+  }
+
+  #toggle(): void {
+    if (this.#listening) this.#put();
+    else this.#take();
+    this.#element.requestUpdate();
+  }
+
+  #take(): void {
+    const { surface } = this.#stage;
+    if (!surface) return;
+    this.#listening = new AbortController();
+    const { signal } = this.#listening;
+    const on = { signal, capture: true };
+    surface.addEventListener('pointerdown', ({ clientX, clientY }) => (this.#pressed = [clientX, clientY]), on);
+    surface.addEventListener('click', this.#onClick, on);
+    surface.addEventListener('keydown', this.#onKey, on);
+    surface.addEventListener('focus', () => this.#draw(), { signal });
+    surface.addEventListener('blur', () => this.#draw(), { signal });
+    this.#element.addEventListener('camera-change', this.#draw, { signal });
+    const observer = new ResizeObserver(() => this.#stage.view && requestAnimationFrame(this.#draw));
+    observer.observe(surface);
+    signal.addEventListener('abort', () => observer.disconnect());
+    surface.after(this.#drawing, this.#label);
+    // By keyboard the ends are set in the middle of the picture: that has the focus then.
+    this.#hasKeyboard = this.#button.matches(':focus-visible');
+    if (surface.tabIndex < 0) {
+      surface.tabIndex = 0;
+      signal.addEventListener('abort', () => surface.removeAttribute('tabindex'));
+    }
+    if (this.#hasKeyboard) surface.focus();
+    this.#say(this.#word('measure-keys'));
+    this.#draw();
+  }
+
+  #put(): void {
+    this.#listening?.abort();
+    this.#listening = undefined;
+    this.#ends = [];
+    this.#drawing.remove();
+    this.#label.remove();
+    this.#say('');
+  }
+
+  #stop(): void {
+    this.#button.remove();
+    if (this.#listening) this.#put();
+  }
+
+  readonly #onClick = (event: MouseEvent): void => {
+    const { clientX, clientY } = event;
+    const from = this.#pressed ?? [clientX, clientY];
+    if (Math.hypot(clientX - from[0], clientY - from[1]) > DRAG) return;
+    event.stopImmediatePropagation();
+    this.#hasKeyboard = false;
+    void this.#setEnd(clientX, clientY);
+  };
+
+  readonly #onKey = (event: KeyboardEvent): void => {
+    if (event.key === 'Escape') {
+      event.stopImmediatePropagation();
+      this.#put();
+      this.#element.requestUpdate();
+      this.#button.focus();
+      return;
+    }
+    if (!this.#hasKeyboard) {
+      this.#hasKeyboard = true;
+      this.#draw();
+    }
+    if (event.key !== 'Enter') return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    const { left, top, width, height } = this.#stage.surface!.getBoundingClientRect();
+    void this.#setEnd(left + width / 2, top + height / 2);
+  };
+
+  async #setEnd(clientX: number, clientY: number): Promise<void> {
+    const signal = this.#listening?.signal;
+    const point = await this.#stage.positionFromPoint(clientX, clientY);
+    if (!signal || signal.aborted) return;
+    if (point === null) return this.#say(this.#word('measure-none'));
+    // A third end begins anew.
+    this.#ends = this.#ends.length === 1 ? [this.#ends[0], point] : [point];
+    this.#draw();
+    const measured = this.#measured();
+    if (!measured) return this.#say('1');
+    this.#say(textOf(measured));
+    this.#element.dispatchEvent(new CustomEvent('measure', { detail: measured }));
+  }
+
+  #measured(): MeasureDetail | undefined {
+    const [from, to] = this.#ends;
+    if (!to) return undefined;
+    const length = Math.hypot(to.x - from.x, to.y - from.y, to.z - from.z);
+    const uncertainty = Math.hypot(from.uncertainty, to.uncertainty);
+    const unit = unitOf(this.#stage);
+    return { from, to, length, uncertainty, meters: unit === undefined ? null : length * unit, unit: unit ?? null };
+  }
+
+  /** Draws the ruler where its ends lie in the last frame. */
+  readonly #draw = (): void => {
+    const { drawnFrom: camera, surface, frame } = this.#stage;
+    this.#drawing.replaceChildren();
+    this.#label.hidden = true;
+    if (!camera || !surface) return;
+    const [width, height] = [surface.clientWidth, surface.clientHeight];
+    if (this.#hasKeyboard && surface.matches(':focus')) this.#add('circle', { cx: width / 2, cy: height / 2, r: 10 });
+    const ends = this.#ends.map(({ x, y, z }) => {
+      const at = project(camera, toScene(frame, [x, y, z]));
+      return { x: (at.x * width) / camera.width, y: (at.y * height) / camera.height, isAhead: at.depth > 0 };
+    });
+    if (ends.some(({ isAhead }) => !isAhead)) return;
+    const [a, b] = ends;
+    if (b) this.#add('line', { x1: a.x, y1: a.y, x2: b.x, y2: b.y });
+    for (const { x, y } of ends) this.#add('circle', { cx: x, cy: y, r: 4 });
+    const measured = this.#measured();
+    if (!measured) return;
+    this.#label.hidden = false;
+    this.#label.textContent = textOf(measured);
+    this.#label.style.left = `${(a.x + b.x) / 2}px`;
+    this.#label.style.top = `${(a.y + b.y) / 2 - 18}px`;
+  };
+
+  #add(name: string, attributes: Readonly<Record<string, number>>): void {
+    const shape = this.#element.ownerDocument.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) shape.setAttribute(key, value.toFixed(1));
+    this.#drawing.append(shape);
+  }
+}
+
+/** `1.24 m ± 0.01 m`; without a unit of the file, numbers alone. */
+function textOf({ length, uncertainty, unit }: MeasureDetail): string {
+  const factor = unit ?? 1;
+  const suffix = unit === null ? '' : ' m';
+  const number = (value: number): string => (value < 1e-3 ? '0.001' : value.toPrecision(DIGITS).replace(/e\+?/, 'e'));
+  const off = Number.isFinite(uncertainty) ? `${number(uncertainty * factor)}${suffix}` : '?';
+  return `${number(length * factor)}${suffix} ± ${off}`;
+}

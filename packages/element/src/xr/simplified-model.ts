@@ -1,0 +1,46 @@
+import type { ReactiveController } from 'lit';
+import type { Stage } from '../stage.js';
+import { languageOf } from '../words.js';
+import { WORDS, type XrOffer } from './xr-offer.js';
+
+/** Browsers that hand models to Quick Look say so of links; their scripts see no WebXR. */
+const opensModels = (page: Document): boolean =>
+  page.createElement('a').relList.supports('ar') || /iPhone|iPad/.test(page.defaultView?.navigator.userAgent ?? '');
+
+/** On iPhones there is no WebXR: the author's own mesh, by its name, if the page has one. */
+export class SimplifiedModel implements ReactiveController {
+  readonly #stage: Stage;
+  readonly #place: HTMLElement;
+  readonly #offer: XrOffer;
+  readonly #link: HTMLAnchorElement;
+  readonly #element: HTMLElement;
+
+  constructor(element: HTMLElement, stage: Stage, place: HTMLElement, offer: XrOffer) {
+    this.#stage = stage;
+    this.#place = place;
+    this.#offer = offer;
+    this.#element = element;
+    this.#link = Object.assign(element.ownerDocument.createElement('a'), { rel: 'ar' });
+    this.#link.setAttribute('part', 'ar-link');
+    // Quick Look opens links whose only child is an image.
+    this.#link.append(element.ownerDocument.createElement('img'));
+  }
+
+  hostUpdated(): void {
+    const { attributes, strings } = this.#stage;
+    const modes = attributes.arModes?.trim() || 'webxr quick-look';
+    const isOffered =
+      attributes.ar &&
+      attributes.iosSrc &&
+      !this.#offer.canActivate &&
+      /(^|\s)quick-look(\s|$)/.test(modes) &&
+      opensModels(this.#element.ownerDocument);
+    if (!isOffered) return this.#link.remove();
+    const text = strings['ar-simplified'] ?? WORDS['ar-simplified'];
+    const image = this.#link.querySelector('img')!;
+    image.alt = text;
+    this.#link.lang = languageOf(strings) ?? '';
+    this.#link.href = new URL(attributes.iosSrc!, this.#element.baseURI).href;
+    if (!this.#link.isConnected) this.#place.append(this.#link);
+  }
+}

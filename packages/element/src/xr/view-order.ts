@@ -1,0 +1,99 @@
+import { cross, dot, eyeOf, normalize, type Camera, type Vector3 } from '@gaussian-splat/core';
+import {
+  DATA_WIDTH,
+  distanceView,
+  isSameView,
+  orderView,
+  SplatOrder,
+  type OrderView,
+} from '@gaussian-splat/renderer/webgl';
+import { DepthSorter } from '../webgl/depth-sorter.js';
+import type { XrScene } from './xr-scene.js';
+
+/** A sort that takes longer, ms, is left to a worker, in an order that turning the head does not change. */
+const QUICK_SORT_MS = 8;
+/** Weight of the last sort in the mean of their times. */
+const SMOOTHING = 0.2;
+/** Eyes whose axes differ by less look the same way: the sine of the angle. */
+const PARALLEL = 1e-4;
+/** The head moves so far, in parts of its distance from the middle of the scene, before a worker sorts again. */
+const MOVED = 0.002;
+
+/** Keeps the splats of a session in order: one order for all views of a frame. */
+export class ViewOrder {
+  readonly #scene: XrScene;
+  readonly #byDistance: boolean;
+  readonly #spawn: () => Worker;
+  readonly #sorter: SplatOrder;
+  readonly #order: Uint32Array;
+  #worker: DepthSorter | undefined;
+  #sorted: OrderView | undefined;
+  /** How long sorts on this thread take, ms. */
+  milliseconds = 0;
+
+  constructor(scene: XrScene, byDistance: boolean, spawn: () => Worker) {
+    this.#scene = scene;
+    this.#byDistance = byDistance;
+    this.#spawn = spawn;
+    this.#sorter = new SplatOrder(scene.positions);
+    this.#order = new Uint32Array(DATA_WIDTH * Math.max(1, Math.ceil(scene.positions.length / 3 / DATA_WIDTH)));
+  }
+
+  /** Sorts for the views of a frame, at once or soon. */
+  update(cameras: readonly Camera[]): void {
+    const view = this.#viewOf(cameras);
+    if (this.#sorted && isSameView(view, this.#sorted)) return;
+    if (this.#sorted === undefined || this.milliseconds <= QUICK_SORT_MS) this.#sortNow(view);
+    else this.#sortSoon(view);
+  }
+
+  destroy(): void {
+    this.#worker?.destroy();
+  }
+
+  /** Eyes that look the same way have one order by depth, to the last splat. Others, and slow sorts, have one by distance from the middle of the eyes. */
+  #viewOf(cameras: readonly Camera[]): OrderView {
+    const [first] = cameras;
+    const { origin } = this.#scene;
+    const isDepth = !this.#byDistance && this.milliseconds <= QUICK_SORT_MS && areParallel(cameras);
+    if (isDepth) return orderView(first, origin);
+    const eyes = cameras.map(({ worldToCamera }) => eyeOf(worldToCamera));
+    const middle = [0, 1, 2].map((k) => eyes.reduce((sum, eye) => sum + eye[k], 0) / eyes.length);
+    return distanceView(first, origin, middle as unknown as Vector3);
+  }
+
+  #sortNow(view: OrderView): void {
+    // The first sort runs code that is not compiled yet: its time says nothing.
+    if (this.#sorted === undefined) this.#sorter.sort(view, this.#order);
+    const begin = performance.now();
+    const count = this.#sorter.sort(view, this.#order);
+    const took = performance.now() - begin;
+    this.milliseconds = this.#sorted === undefined ? took : this.milliseconds + SMOOTHING * (took - this.milliseconds);
+    this.#set(view, this.#order, count);
+  }
+
+  #sortSoon(view: OrderView): void {
+    const before = this.#sorted?.point;
+    if (before && view.point && distance(before, view.point) < MOVED * distance(view.point, [0, 0, 0])) return;
+    this.#worker ??= new DepthSorter({
+      ...{ positions: this.#scene.positions, spawn: this.#spawn },
+      onOrder: (sorted) => this.#set(sorted.view, sorted.order, sorted.count),
+    });
+    this.#worker.request(view);
+  }
+
+  #set(view: OrderView, order: Uint32Array, count: number): void {
+    this.#scene.renderer.setOrder(order, count);
+    this.#sorted = view;
+  }
+}
+
+const axisOf = ({ worldToCamera: m }: Camera): Vector3 => normalize([m[8], m[9], m[10]]);
+const distance = (a: Vector3, b: Vector3): number => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+
+function areParallel([first, ...others]: readonly Camera[]): boolean {
+  const axis = axisOf(first);
+  return others.every((camera) => length(cross(axis, axisOf(camera))) < PARALLEL && dot(axis, axisOf(camera)) > 0);
+}
+
+const length = (v: Vector3): number => Math.hypot(...v);

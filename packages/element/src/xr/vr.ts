@@ -1,0 +1,84 @@
+import type { Vector3 } from '@gaussian-splat/core';
+import { eyeOfPose, type ViewerFrame } from '../camera/orbit.js';
+import { readAttribute } from '../camera/grammar.js';
+import { lengthGrammar, optionalLengthGrammar } from '../camera/lengths.js';
+import { prefersReducedMotion } from '../controllers/motion.js';
+import type { Stage } from '../stage.js';
+import { openFloor } from '../walk/floor-source.js';
+import { MarkerSplats } from './marker-splats.js';
+import { VrRig } from './vr-rig.js';
+import type { XrKind, XrStarted } from './xr-offer.js';
+import type { XrGuide } from './xr-session.js';
+
+/** Behind the splats, premultiplied. */
+const BACKGROUND = [0.1, 0.1, 0.11, 1] as const;
+/** A floor that is smaller is none, m². */
+const MIN_AREA = 4;
+
+/** The unit of the file, meters. */
+export const unitOf = (stage: Stage): number | undefined =>
+  readAttribute('unit', stage.attributes.unit, optionalLengthGrammar, (sentence) => stage.warn(sentence));
+
+/** Rows of the matrix from the scene's frame to viewer space in meters. */
+export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
+  Float64Array.from([
+    ...x.map((v) => v * unit),
+    0,
+    ...y.map((v) => v * unit),
+    0,
+    ...z.map((v) => v * unit),
+    0,
+    0,
+    0,
+    0,
+    1,
+  ]);
+
+/** Sessions with a headset that shuts out the room. */
+export const vrKind = (stage: Stage): XrKind => ({
+  ...{ mode: 'immersive-vr', name: 'vr', word: 'vr' },
+  isWanted: () => stage.attributes.vr,
+  options: () => ({ optionalFeatures: ['local-floor', 'hand-tracking'] }),
+  spaces: ['local-floor', 'local'],
+  guide: (started) => guideOf(stage, started),
+});
+
+function guideOf(stage: Stage, { session, space, spaceType, signal, gl }: XrStarted): XrGuide {
+  const unit = unitOf(stage) ?? 1;
+  const { goal } = stage.camera;
+  const rig = new VrRig(
+    {
+      eye: eyeOfPose(goal).map((value) => value * unit) as unknown as Vector3,
+      heading: goal.theta,
+      toViewer: metersOf(stage.frame, unit),
+      isFloor: spaceType === 'local-floor',
+      stepsOnly: prefersReducedMotion(),
+    },
+    () => void session.end().catch(() => undefined),
+  );
+  findFloor(stage, unit, signal).then(
+    (map) => map && !signal.aborted && (rig.map = map),
+    () => undefined,
+  );
+  const marker = new MarkerSplats(gl, 'ring', stage.services.sceneLoader, signal);
+  return {
+    background: BACKGROUND,
+    place: (frame, pose, seconds) => rig.place(frame, pose, space, seconds),
+    drawAbove: (camera, at) => {
+      const place = rig.targetInSpace;
+      if (place) marker.draw(camera, at, place);
+    },
+  };
+}
+
+async function findFloor(stage: Stage, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
+  const { attributes, camera, frame, services, walkable: request, element } = stage;
+  const eye = eyeOfPose(camera.goal).map((value) => value * unit) as unknown as Vector3;
+  const eyeHeight = readAttribute('eye-height', attributes.eyeHeight, lengthGrammar('1.6m'), () => undefined);
+  const url = attributes.walkMap?.trim() || 'auto';
+  const mapUrl = url === 'auto' ? null : new URL(url, element.baseURI).href;
+  const source = { loader: services.sceneLoader, request: request!, mapUrl, frame, metersPerUnit: unit, eyeHeight };
+  const map = await openFloor({ ...source, near: eye }, signal);
+  if (map.area < MIN_AREA) throw new Error('no floor');
+  return map;
+}

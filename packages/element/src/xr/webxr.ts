@@ -1,0 +1,90 @@
+/** What is used of WebXR, which TypeScript has no types of. */
+
+export type XrMode = 'immersive-vr' | 'immersive-ar';
+
+export interface XrSystem extends EventTarget {
+  isSessionSupported(mode: XrMode): Promise<boolean>;
+  requestSession(mode: XrMode, options?: object): Promise<XrSession>;
+}
+
+export interface XrSession extends EventTarget {
+  readonly inputSources: Iterable<XrInput>;
+  readonly frameRate?: number | undefined;
+  readonly environmentBlendMode?: string;
+  readonly enabledFeatures?: readonly string[];
+  requestAnimationFrame(callback: (time: number, frame: XrFrame) => void): number;
+  requestReferenceSpace(type: string): Promise<XrSpace>;
+  requestHitTestSource?(options: object): Promise<XrHitTestSource>;
+  updateRenderState(state: object): void;
+  end(): Promise<void>;
+}
+
+export interface XrHitTestSource {
+  cancel(): void;
+}
+
+export interface XrHit {
+  getPose(space: XrSpace): XrPose | undefined;
+  createAnchor?(): Promise<XrAnchor>;
+}
+
+export interface XrAnchor {
+  readonly anchorSpace: XrSpace;
+  delete(): void;
+}
+
+export type XrSpace = EventTarget;
+
+export interface XrPose {
+  readonly transform: XrTransform;
+}
+
+export interface XrTransform {
+  readonly position: { readonly x: number; readonly y: number; readonly z: number };
+  /** Column-major. */
+  readonly matrix: Float32Array;
+  readonly inverse: XrTransform;
+}
+
+export interface XrView extends XrPose {
+  readonly eye: string;
+  readonly projectionMatrix: Float32Array;
+}
+
+export interface XrFrame {
+  readonly session: XrSession;
+  getViewerPose(space: XrSpace): (XrPose & { readonly views: readonly XrView[] }) | undefined | null;
+  getPose(space: XrSpace, base: XrSpace): XrPose | undefined | null;
+  getHitTestResults?(source: XrHitTestSource): readonly XrHit[];
+}
+
+export interface XrInput {
+  readonly handedness: string;
+  readonly targetRaySpace: XrSpace;
+  readonly gamepad?: Gamepad | null | undefined;
+}
+
+export interface XrViewport {
+  readonly x: number;
+  readonly y: number;
+  readonly width: number;
+  readonly height: number;
+}
+
+export interface XrLayer {
+  readonly framebuffer: WebGLFramebuffer | null;
+  readonly framebufferWidth: number;
+  readonly framebufferHeight: number;
+  getViewport(view: XrView): XrViewport | null;
+}
+
+type LayerClass = new (session: XrSession, gl: WebGL2RenderingContext, options: object) => XrLayer;
+
+export const xrOf = (view: Window | null): XrSystem | undefined =>
+  (view?.navigator as { xr?: XrSystem } | undefined)?.xr;
+
+export const makeLayer = (session: XrSession, gl: WebGL2RenderingContext): XrLayer => {
+  const { XRWebGLLayer } = globalThis as unknown as { XRWebGLLayer: LayerClass };
+  // Splats are blended in a texture of the renderer's own: samples and depth of the layer would be of no use.
+  return new XRWebGLLayer(session, gl, { antialias: false, depth: false, stencil: false, ignoreDepthValues: true });
+};

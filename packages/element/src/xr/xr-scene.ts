@@ -1,0 +1,86 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
+import { isGenerator } from '../gpu/open-scene.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+import { GlLoaded } from '../webgl/gl-loaded.js';
+
+/** How long a context may take to become one for a headset, ms: browsers without a headset never answer. */
+const COMPATIBLE_MS = 2_000;
+
+/** A scene that a session draws. */
+export interface XrScene {
+  readonly renderer: GlRenderer;
+  /** [N, 3] relative to `origin` */
+  readonly positions: Float32Array;
+  readonly origin: GlGaussians['facts']['origin'];
+  destroy(): void;
+}
+
+/** A context for a session, and whether it is the session's own. */
+export interface XrContext {
+  readonly gl: WebGL2RenderingContext;
+  readonly isOwn: boolean;
+}
+
+export interface XrSceneSource {
+  readonly shown: LoadedGaussians | null;
+  readonly request: SceneRequest;
+  readonly loader: SceneLoader;
+}
+
+/** The page's context where it draws with WebGL and the headset can show it, else one of the session's own. */
+export async function contextFor(shown: LoadedGaussians | null): Promise<XrContext> {
+  if (shown instanceof GlLoaded && !shown.isLost && (await becomesCompatible(shown.lease.gl)))
+    return { gl: shown.lease.gl, isOwn: false };
+  const gl = document.createElement('canvas').getContext('webgl2', {
+    ...{ alpha: true, antialias: false, depth: false, stencil: false, xrCompatible: true },
+    powerPreference: 'high-performance',
+  });
+  if (gl === null || gl.isContextLost()) throw unsupported('a WebGL 2 context for a headset', 'none');
+  return { gl, isOwn: true };
+}
+
+async function becomesCompatible(gl: WebGL2RenderingContext): Promise<boolean> {
+  const { makeXRCompatible } = gl as { makeXRCompatible?: () => Promise<void> };
+  if (!makeXRCompatible) return false;
+  const late = new Promise<boolean>((resolve) => setTimeout(() => resolve(false), COMPATIBLE_MS));
+  const made = makeXRCompatible.call(gl).then(
+    () => !gl.isContextLost(),
+    () => false,
+  );
+  return Promise.race([made, late]);
+}
+
+/** The scene in a context: the splats on show, or the same file once more, usually from the browser's cache. */
+export async function openXrScene(
+  { gl, isOwn }: XrContext,
+  { shown, request, loader }: XrSceneSource,
+  signal: AbortSignal,
+): Promise<XrScene> {
+  if (!isOwn && shown instanceof GlLoaded) {
+    const { textures, positions } = shown;
+    const renderer = new GlRenderer(gl, textures);
+    return { renderer, positions, origin: textures.facts.origin, destroy: () => renderer.destroy() };
+  }
+  if (isGenerator(request)) throw unsupported('the file of a scene', 'a generator');
+  const asked = { ...request, levels: false, isWhole: true };
+  const { packed } = await loader.load(asked, signal, () => undefined);
+  signal.throwIfAborted();
+  const gaussians = await GlGaussians.upload(gl, packed);
+  const renderer = new GlRenderer(gl, gaussians);
+  const destroy = (): void => {
+    renderer.destroy();
+    gaussians.destroy();
+  };
+  return { renderer, positions: positionsIn(packed.geometry), origin: packed.origin, destroy };
+}
+
+export const unsupported = (expected: string, found: string): GaussianSplatError =>
+  new GaussianSplatError('unsupported/xr', {
+    where: '<gaussian-splat>',
+    expected,
+    found,
+    remedy: 'use a browser and a device with WebXR, in a secure page whose frames allow="xr-spatial-tracking"',
+  });

@@ -1,0 +1,122 @@
+/** AR with an emulated phone in an emulated room: where the subject stands, how large it is, and what iPhones get. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { GlRenderer } from '@gaussian-splat/renderer/webgl';
+import { headset } from './support/headset.js';
+import { assert, assertEqual, COMPASS, frames, showLoaded, until } from './support/harness.js';
+
+const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
+const LIMIT_MS = 3_000;
+const PLANE = 0.3;
+
+/** The floor of the room: hits of the ray from the eyes, 20 degrees down. */
+function room(): void {
+  const { XRSession, XRFrame } = globalThis as unknown as Record<string, { prototype: Record<string, unknown> }>;
+  XRSession.prototype.requestHitTestSource = () => Promise.resolve({ cancel: () => undefined });
+  XRFrame.prototype.getHitTestResults = () => [
+    {
+      getPose: () => ({
+        transform: {
+          position: { x: 0.2, y: PLANE, z: -1.5 },
+          matrix: Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.2, PLANE, -1.5, 1]),
+        },
+      }),
+    },
+  ];
+}
+
+/** Cameras that the scene was drawn with. */
+async function start(attributes: Readonly<Record<string, string>>): Promise<[GaussianSplatElement, ArrayLike<number>]> {
+  headset();
+  room();
+  const xr = (navigator as unknown as { xr: { requestSession: unknown; isSessionSupported: unknown } }).xr;
+  xr.isSessionSupported = () => Promise.resolve(true);
+  const asked = (xr.requestSession as (mode: string, options: object) => Promise<unknown>).bind(xr);
+  xr.requestSession = (mode: string, options: object) => {
+    assertEqual(mode, 'immersive-ar', 'mode');
+    assert(JSON.stringify(options).includes('hit-test'), JSON.stringify(Object.keys(options)));
+    return asked('immersive-ar', { optionalFeatures: ['local-floor'] });
+  };
+  const { render } = GlRenderer.prototype;
+  let camera: { worldToCamera: ArrayLike<number> } | undefined;
+  GlRenderer.prototype.render = function (request, quads) {
+    if (request.shDegree > 0) ({ camera } = request);
+    render.call(this, request, quads);
+  };
+  try {
+    const element = await showLoaded({ src: COMPASS, ar: '', ...STILL, ...attributes });
+    const button = (): HTMLButtonElement | null => element.shadowRoot!.querySelector('[part=ar-button]');
+    await until(() => button() !== null, 'the button', LIMIT_MS);
+    button()!.click();
+    await until(() => element.getAttribute('ar-status') === 'object-placed', 'a place', LIMIT_MS);
+    await until(() => camera !== undefined, 'a picture', LIMIT_MS);
+    return [element, camera!.worldToCamera];
+  } finally {
+    Object.assign(GlRenderer.prototype, { render });
+    xr.requestSession = asked;
+  }
+}
+
+/** A point of the scene in the room: the phone stands at the origin of its floor, 1.6 m high, and looks ahead. */
+function inRoom(m: ArrayLike<number>, [x, y, z]: readonly number[]): number[] {
+  const row = (r: number): number => m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
+  return [row(0), 1.6 - row(1), -row(2)];
+}
+
+describe('AR', () => {
+  it('stands on the plane, front to the person, in its true size', async () => {
+    const [element, m] = await start({ 'ar-scale': 'fixed', unit: '10cm' });
+    const { bounds } = (element as unknown as { stage: { camera: { bounds: { center: number[]; radius: number } } } })
+      .stage.camera;
+    const size = Math.hypot(m[0], m[1], m[2]);
+    assert(Math.abs(size / 0.1 - 1) < 1e-3, `${size} m for a unit`);
+    const { readScene, fetchScene } = await import('@gaussian-splat/formats');
+    const cloud = await readScene(await fetchScene(COMPASS), { name: 'compass.splat' });
+    const heights = [];
+    for (let i = 0; i < cloud.count; i++) {
+      const p = [0, 1, 2].map((k) => cloud.positions[3 * i + k] + cloud.origin[k]);
+      const away = Math.hypot(...p.map((value, k) => value - bounds.center[k]));
+      if (away <= bounds.radius) heights.push(inRoom(m, p)[1]);
+    }
+    heights.sort((a, b) => a - b);
+    const lowest = heights[Math.floor(0.01 * heights.length)];
+    assert(Math.abs(lowest - PLANE) < 0.01, `lowest splats at ${lowest}`);
+    const middle = inRoom(m, bounds.center);
+    assert(Math.hypot(middle[0] - 0.2, middle[2] + 1.5) < 0.02, `middle at ${middle}`);
+    element.exitXR!();
+    await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+  });
+
+  it('is 0.5 to 1 m large at first where no size is known', async () => {
+    const [element, m] = await start({});
+    const { bounds } = (element as unknown as { stage: { camera: { bounds: { radius: number } } } }).stage.camera;
+    const size = 2 * bounds.radius * Math.hypot(m[0], m[1], m[2]);
+    assert(size > 0.45 && size < 1.05, `${size} m`);
+    element.exitXR!();
+    await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+  });
+
+  it('on iPhones is a link to the model of the author, by its honest name; else nothing', async () => {
+    headset();
+    const { xr } = navigator as unknown as { xr: { isSessionSupported: unknown } };
+    xr.isSessionSupported = () => Promise.resolve(false);
+    const userAgent = Object.getOwnPropertyDescriptor(Navigator.prototype, 'userAgent')!;
+    Object.defineProperty(navigator, 'userAgent', {
+      configurable: true,
+      value: 'Mozilla/5.0 (iPhone; CPU iPhone OS 26_0)',
+    });
+    try {
+      const element = await showLoaded({ src: COMPASS, ar: '', 'ios-src': 'compass.usdz', ...STILL });
+      const link = (): HTMLAnchorElement | null => element.shadowRoot!.querySelector('a[rel=ar]');
+      await until(() => link() !== null, 'the link', LIMIT_MS);
+      assert(link()!.href.endsWith('/compass.usdz'), link()!.href);
+      assertEqual(link()!.querySelector('img')!.alt, 'View a simplified model in AR', 'its name');
+      const other = await showLoaded({ src: COMPASS, ar: '', ...STILL });
+      await frames(4);
+      assertEqual(other.shadowRoot!.querySelector('a[rel=ar], [part=ar-button]'), null, 'without a model');
+    } finally {
+      Object.defineProperty(navigator, 'userAgent', userAgent);
+      Reflect.deleteProperty(navigator, 'userAgent');
+    }
+  });
+});

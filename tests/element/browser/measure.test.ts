@@ -1,0 +1,109 @@
+/** The ruler: by mouse and by keyboard alone, its length, its words, and what a screen reader hears. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, atRest, nextEvent, showLoaded, until } from './support/harness.js';
+
+const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none', 'camera-controls': '' };
+
+/** A floor of flat splats at y = 0, 0.1 units apart, 8 x 8 units, as a `.splat`: y down. */
+function floor(): string {
+  const side = 81;
+  const rows = new Float32Array(8 * side * side);
+  const bytes = new Uint8Array(rows.buffer);
+  for (let i = 0; i < side * side; i++) {
+    const [x, z] = [(i % side) / 10 - 4, Math.floor(i / side) / 10 - 4];
+    rows.set([x, 0, z, 0.08, 0.005, 0.08], 8 * i);
+    bytes.set([150, 140, 120, 255, 255, 128, 128, 128], 32 * i + 24);
+  }
+  return `${URL.createObjectURL(new Blob([rows]))}#floor.splat`;
+}
+
+const button = (element: GaussianSplatElement): HTMLButtonElement | null =>
+  element.shadowRoot!.querySelector('[part=measure-button]');
+const label = (element: GaussianSplatElement): string =>
+  element.shadowRoot!.querySelector('[part=measure-label]')?.textContent ?? '';
+const spoken = (element: GaussianSplatElement): string =>
+  element.shadowRoot!.querySelector('[aria-live], [role=status]')?.textContent?.trim() ?? '';
+
+interface Measured {
+  readonly length: number;
+  readonly meters: number | null;
+  readonly uncertainty: number;
+}
+
+const FROM_ABOVE = {
+  'camera-orbit': '0deg 25deg 7m',
+  'camera-target': '0m 0m 0m',
+  'min-camera-orbit': 'auto 0deg auto',
+};
+
+async function ruler(attributes: Readonly<Record<string, string>>): Promise<GaussianSplatElement> {
+  const all = { src: floor(), measure: '', ...STILL, ...FROM_ABOVE, ...attributes };
+  const element = await showLoaded(all, 'width: 240px; height: 200px');
+  await until(() => button(element) !== null, 'the button');
+  await atRest(element);
+  return element;
+}
+
+describe('measure', () => {
+  it('measures between two clicks, in meters where a unit is given', async () => {
+    const element = await ruler({ unit: '50cm' });
+    button(element)!.click();
+    await element.updateComplete;
+    assertEqual(button(element)!.getAttribute('aria-pressed'), 'true', 'pressed');
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    const { left, top } = view.getBoundingClientRect();
+    const points = [
+      [40, 100],
+      [200, 100],
+    ].map(([x, y]) => ({ clientX: left + x, clientY: top + y }));
+    const expected = await Promise.all(
+      points.map(({ clientX, clientY }) => element.positionFromPoint(clientX, clientY)),
+    );
+    const measured = nextEvent<CustomEvent<Measured>>(element, 'measure');
+    for (const place of points) {
+      view.dispatchEvent(new PointerEvent('pointerdown', { ...place, bubbles: true }));
+      view.dispatchEvent(new MouseEvent('click', { ...place, bubbles: true }));
+      await until(() => element.shadowRoot!.querySelector('.ruler circle') !== null, 'an end');
+    }
+    const { detail } = await measured;
+    // The points lie side by side on the floor, at the distance of its middle: that is known without the pick.
+    const truth = (160 / 200) * 7 * 2 * Math.tan(Math.PI / 8);
+    assert(Math.abs(detail.length / truth - 1) < 0.005, `${detail.length} in place of ${truth}`);
+    assert(Math.abs(detail.meters! - detail.length / 2) < 1e-9, `${detail.meters} m`);
+    assert(detail.uncertainty < 0.2 && expected.every(Boolean), `± ${detail.uncertainty}`);
+    assert(/^2\.\d\d m ± 0\.\d+ m$/.test(label(element)), label(element));
+    await until(() => spoken(element) === label(element), `its words, not ${spoken(element)}`);
+    const before = element.shadowRoot!.querySelector('.ruler line')!.getAttribute('x1');
+    element.setAttribute('camera-orbit', '40deg 25deg 7m');
+    await until(
+      () => element.shadowRoot!.querySelector('.ruler line')?.getAttribute('x1') !== before,
+      'a line that moves with the view',
+    );
+  });
+
+  it('measures by keyboard alone, and without a unit speaks of no meters', async () => {
+    const element = await ruler({});
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    button(element)!.focus();
+    button(element)!.click();
+    view.focus();
+    const press = (key: string): boolean =>
+      view.dispatchEvent(new KeyboardEvent('keydown', { key, code: key, bubbles: true }));
+    press('Enter');
+    await until(() => element.shadowRoot!.querySelectorAll('.ruler circle').length === 2, 'the first end and the mark');
+    for (let i = 0; i < 3; i++) press('ArrowRight');
+    element.setAttribute('camera-target', '1m 0m 0m');
+    await atRest(element);
+    const measured = nextEvent<CustomEvent<Measured>>(element, 'measure');
+    press('Enter');
+    const { detail } = await measured;
+    assertEqual(detail.meters, null, 'meters');
+    assert(detail.length > 0.5 && detail.length < 1.5, `${detail.length}`);
+    assert(!/m/.test(label(element)) && label(element).includes('±'), label(element));
+    press('Escape');
+    await element.updateComplete;
+    assertEqual(element.shadowRoot!.querySelector('.ruler'), null, 'the ruler');
+    assertEqual(element.shadowRoot!.activeElement, button(element), 'focus');
+  });
+});

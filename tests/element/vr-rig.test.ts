@@ -1,0 +1,110 @@
+/** Where a person in a headset stands: turns, steps and jumps on the floor alone. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { VrRig } from '../../packages/element/dist/xr/vr-rig.js';
+
+/** A floor of 4 x 4 m around the origin, at 1 m. */
+const side = 80;
+const map = {
+  ...{ cell: 0.05, corner: [-2, -2] as const, width: side, depth: side, step: 0.3, area: 16 },
+  layers: [new Float32Array(side * side).fill(1)],
+  start: [0, 1, 0] as const,
+};
+const identity = Float64Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+
+interface Stick {
+  readonly handedness: string;
+  readonly axes?: readonly number[];
+  readonly pressed?: readonly number[];
+  /** Of its ray: column-major. */
+  readonly ray?: readonly number[];
+}
+
+function rigAt(heading = 0, stepsOnly = false, onLeave = (): void => undefined) {
+  const rig = new VrRig({ eye: [0, 2.6, 0], heading, toViewer: identity, isFloor: true, stepsOnly }, onLeave);
+  rig.map = map as never;
+  const head = {
+    position: { x: 0.1, y: 1.6, z: 0.2 },
+    matrix: Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 1.6, 0.2, 1]),
+  };
+  /** @returns where the head is in the scene */
+  const frame = (sticks: readonly Stick[] = [], seconds = 0.1): number[] => {
+    const inputSources = sticks.map(({ handedness, axes = [0, 0, 0, 0], pressed = [], ray }) => ({
+      ...{ handedness, targetRaySpace: ray },
+      gamepad: { axes, buttons: Array.from({ length: 6 }, (_, i) => ({ pressed: pressed.includes(i) })) },
+    }));
+    const getPose = (ray: readonly number[]) => ({ transform: { matrix: Float32Array.from(ray) } });
+    const m = rig.place(
+      { session: { inputSources }, getPose } as never,
+      { transform: head } as never,
+      {} as never,
+      seconds,
+    );
+    // The inverse of a rotation and a translation, at the head.
+    const p = [0.1 - m[3], 1.6 - m[7], 0.2 - m[11]];
+    return [0, 1, 2].map((k) => m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2]);
+  };
+  return { rig, frame };
+}
+
+const near = (found: readonly number[], expected: readonly number[], digits = 1e-6): void =>
+  assert.ok(
+    found.every((value, i) => Math.abs(value - expected[i]) < digits),
+    `${found} in place of ${expected}`,
+  );
+
+test('the head starts where the camera was, with the floor under the feet', () => {
+  near(rigAt().frame(), [0, 2.6, 0]);
+  near(rigAt(1).frame(), [0, 2.6, 0]);
+});
+
+test('a turn of 30 degrees goes around the head, once for each deflection', () => {
+  const { frame } = rigAt();
+  const right = [{ handedness: 'right', axes: [0, 0, 1, 0] }];
+  for (let i = 0; i < 3; i++) near(frame(right), [0, 2.6, 0]);
+  const left = [{ handedness: 'left', axes: [0, 0, 0, -1] }];
+  // Ahead of a head that looks to -z, after a turn to the right.
+  frame([]);
+  const at = frame(left);
+  near(at, [0.14 * Math.sin(Math.PI / 6), 2.6, -0.14 * Math.cos(Math.PI / 6)]);
+});
+
+test('walking stays on the floor, and not at all for those who ask for less motion', () => {
+  const { frame } = rigAt();
+  let at: number[] = [];
+  for (let i = 0; i < 100; i++) at = frame([{ handedness: 'left', axes: [0, 0, 1, -0.3] }]);
+  assert.ok(Math.abs(at[0]) < 2 && Math.abs(at[2]) < 2 && Math.abs(at[1] - 2.6) < 1e-3, String(at));
+  near(rigAt(0, true).frame([{ handedness: 'left', axes: [0, 0, 0, -1] }]), [0, 2.6, 0]);
+});
+
+/** From 1.5 m above the floor, ahead and down by 45 degrees to a side. */
+const rayTo = (x: number): number[] => {
+  const s = Math.SQRT1_2;
+  const length = Math.hypot(x, 1, 1);
+  void s;
+  return [1, 0, 0, 0, 0, 1, 0, 0, -x / length, 1 / length, 1 / length, 0, 0.1, 1.5, 0.2, 1];
+};
+
+test('a jump goes to the floor that is aimed at, and nowhere else', () => {
+  const { rig, frame } = rigAt();
+  const aim = (x: number, pressed: number[]): number[] => frame([{ handedness: 'right', pressed, ray: rayTo(x) }]);
+  frame();
+  aim(0, [0]);
+  assert.ok(rig.target && Math.abs(rig.target[2] + 1.5) < 0.06, String(rig.target));
+  near(aim(0, []), [0, 2.6, -1.5], 0.06);
+  // Far to the side there is no floor.
+  const before = frame();
+  aim(3, [0]);
+  assert.equal(rig.target, undefined);
+  near(aim(3, []), before);
+});
+
+test('the button that leaves is held for a second', () => {
+  let left = 0;
+  const { frame } = rigAt(0, false, () => left++);
+  for (let i = 0; i < 8; i++) frame([{ handedness: 'right', pressed: [5] }]);
+  frame([{ handedness: 'right' }]);
+  assert.equal(left, 0);
+  for (let i = 0; i < 12; i++) frame([{ handedness: 'right', pressed: [5] }]);
+  assert.equal(left, 1);
+});
