@@ -2,6 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { GlRenderer } from '@gaussian-splat/renderer/webgl';
+import { itInLab } from '../../support/extent-in-pages.js';
 import { headset } from './support/headset.js';
 import { assert, assertEqual, COMPASS, frames, showLoaded, until } from './support/harness.js';
 
@@ -64,7 +65,7 @@ function inRoom(m: ArrayLike<number>, [x, y, z]: readonly number[]): number[] {
 }
 
 describe('AR', () => {
-  it('stands on the plane, front to the person, in its true size', async () => {
+  itInLab('stands on the plane, front to the person, in its true size', async () => {
     const [element, m] = await start({ 'ar-scale': 'fixed', unit: '10cm' });
     const { bounds } = (element as unknown as { stage: { camera: { bounds: { center: number[]; radius: number } } } })
       .stage.camera;
@@ -87,7 +88,7 @@ describe('AR', () => {
     await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
   });
 
-  it('is 0.5 to 1 m large at first where no size is known', async () => {
+  itInLab('is 0.5 to 1 m large at first where no size is known', async () => {
     const [element, m] = await start({});
     const { bounds } = (element as unknown as { stage: { camera: { bounds: { radius: number } } } }).stage.camera;
     const size = 2 * bounds.radius * Math.hypot(m[0], m[1], m[2]);
@@ -96,7 +97,7 @@ describe('AR', () => {
     await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
   });
 
-  it('on iPhones is a link to the model of the author, by its honest name; else nothing', async () => {
+  itInLab('on iPhones is a link to the model of the author, by its honest name; else nothing', async () => {
     headset();
     const { xr } = navigator as unknown as { xr: { isSessionSupported: unknown } };
     xr.isSessionSupported = () => Promise.resolve(false);
