@@ -8,7 +8,17 @@ import { renderOracle, toRgba } from '../../oracle/oracle.js';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { psnr } from '../../support/metrics.js';
 import { EYE, headset } from './support/headset.js';
-import { assert, assertEqual, COMPASS, frames, nextEvent, showLoaded, submits, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  claimComing,
+  COMPASS,
+  frames,
+  nextEvent,
+  showLoaded,
+  submits,
+  until,
+} from './support/harness.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none', 'camera-orbit': '30deg 80deg 6m' };
 const VR = { vr: '', 'camera-controls': '', ...STILL };
@@ -120,7 +130,7 @@ describe('VR', () => {
     await leave(element);
   });
 
-  itInLab('sorts once a frame, and the page draws nothing meanwhile', async () => {
+  it('sorts once a frame, and the page draws nothing meanwhile', async () => {
     const element = await showVr();
     await enter(element);
     const drawn = submits;
@@ -207,7 +217,7 @@ describe('VR', () => {
     assertEqual(unhandled.length, 0, String(unhandled));
   });
 
-  itInLab('offers nothing where there is no headset, and says what is refused', async () => {
+  it('offers nothing where there is no headset, and says what is refused', async () => {
     headset();
     const { isSessionSupported, requestSession } = xr();
     try {
@@ -221,6 +231,7 @@ describe('VR', () => {
         assertEqual([buttonOf(element), element.canActivateVR ?? false], [null, false], 'button');
         element.remove();
       }
+      await claimComing(/xr-spatial-tracking/);
       let answerLate: (isSupported: boolean) => void = () => undefined;
       xr().isSessionSupported = () => new Promise((resolve) => (answerLate = resolve));
       const element = await showLoaded(VR);

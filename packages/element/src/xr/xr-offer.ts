@@ -103,7 +103,9 @@ export class XrOffer implements ReactiveController {
     else this.#button.removeAttribute('lang');
     if (!this.canActivate || this.isPresenting) this.#slot.remove();
     else if (!this.#slot.isConnected) this.#place.append(this.#slot);
-    if (this.#running && this.stage.sources.own.scene.scene !== this.#running.shown) this.end();
+    // Out of sight another source is not loaded: the session ends as soon as it is asked for.
+    const { own } = this.stage.sources;
+    if (this.#running && (own.isLeaving || own.scene.scene !== this.#running.shown)) this.end();
   }
 
   hostDisconnected(): void {
