@@ -217,7 +217,7 @@ describe('VR', () => {
     assertEqual(unhandled.length, 0, String(unhandled));
   });
 
-  it('offers nothing where there is no headset, and says what is refused', async () => {
+  itInLab('offers nothing where there is no headset, and says what is refused', async () => {
     headset();
     const { isSessionSupported, requestSession } = xr();
     try {
