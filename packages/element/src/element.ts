@@ -15,6 +15,7 @@ import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
 import { readSpokenStrings, type SpokenStrings } from './words.js';
+import type { ImmersiveMethods } from './xr/methods.js';
 
 /** The properties that move the camera, and what each sets. */
 const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
@@ -116,6 +117,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {Event} contextlost - The GPU device was lost; the element recovers by itself.
  * @fires {Event} contextrestored - The frame is back.
  */
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class GaussianSplatElement extends ViewingMethods {
   /** The GPU device of all elements. A page with a device of its own may put `new SharedDevice(...)` here beforehand. */
   static sharedDevice = new SharedDevice();
@@ -413,6 +415,10 @@ export class GaussianSplatElement extends ViewingMethods {
     }
   }
 }
+
+/** Methods of VR and AR come with their code. */
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging, @typescript-eslint/no-empty-object-type
+export interface GaussianSplatElement extends ImmersiveMethods {}
 
 declare global {
   interface HTMLElementTagNameMap {

@@ -1,5 +1,5 @@
 import { css } from 'lit';
-import type { Stage } from '../stage.js';
+import type { XrHost } from './xr-host.js';
 import { languageOf } from '../words.js';
 import { WORDS } from './xr-offer.js';
 
@@ -34,12 +34,12 @@ export const AR_STYLES = css`
 /** What lies over the room on a phone: a button to leave, and the author's prompt until the object stands. */
 export class ArOverlay {
   readonly root: HTMLElement;
-  readonly #stage: Stage;
+  readonly #stage: XrHost;
   readonly #prompt: HTMLSlotElement;
   readonly #exit: HTMLButtonElement;
   onExit: () => void = () => undefined;
 
-  constructor(element: HTMLElement, stage: Stage) {
+  constructor(element: HTMLElement, stage: XrHost) {
     const { ownerDocument: page } = element;
     this.#stage = stage;
     this.root = page.createElement('div');

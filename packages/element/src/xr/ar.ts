@@ -1,7 +1,7 @@
 import { multiply, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import { toViewer } from '../camera/orbit.js';
-import type { Stage } from '../stage.js';
+import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
 import { AR_STYLES, ArOverlay } from './ar-overlay.js';
 import { MarkerSplats } from './marker-splats.js';
@@ -35,7 +35,7 @@ interface Footprint {
 }
 
 /** The subject among splats: what lies within the ball that framing has found, but for the lowest hundredth. */
-export function footprintOf(stage: Stage, positions: Float32Array, origin: Vector3): Footprint {
+export function footprintOf(stage: XrHost, positions: Float32Array, origin: Vector3): Footprint {
   const { center, radius } = stage.camera.bounds;
   const { frame } = stage;
   const kept = positions.slice();
@@ -54,7 +54,7 @@ export function footprintOf(stage: Stage, positions: Float32Array, origin: Vecto
 }
 
 /** Offers AR: WebXR where there is some, else the author's model on iPhones. */
-export function offerAr(element: ReactiveControllerHost & HTMLElement, stage: Stage, place: HTMLElement): XrOffer {
+export function offerAr(element: ReactiveControllerHost & HTMLElement, stage: XrHost, place: HTMLElement): XrOffer {
   adoptStyles(element.shadowRoot!, AR_STYLES);
   const overlay = new ArOverlay(element, stage);
   const offer = new XrOffer(element, stage, place, arKind(stage, overlay));
@@ -63,7 +63,7 @@ export function offerAr(element: ReactiveControllerHost & HTMLElement, stage: St
   return offer;
 }
 
-const arKind = (stage: Stage, overlay: ArOverlay): XrKind => ({
+const arKind = (stage: XrHost, overlay: ArOverlay): XrKind => ({
   ...{ mode: 'immersive-ar', name: 'ar', word: 'ar' },
   isWanted: () => stage.attributes.ar && /(^|\s)webxr(\s|$)/.test(stage.attributes.arModes?.trim() || 'webxr'),
   options: () => ({
@@ -78,7 +78,7 @@ const arKind = (stage: Stage, overlay: ArOverlay): XrKind => ({
 /** Puts the subject where the view meets a surface of the room, and lets fingers move, turn and scale it. */
 class ArGuide implements XrGuide {
   readonly background = [0, 0, 0, 0] as const;
-  readonly #stage: Stage;
+  readonly #stage: XrHost;
   readonly #of: XrStarted;
   readonly #overlay: ArOverlay;
   readonly #disc: MarkerSplats;
@@ -92,7 +92,7 @@ class ArGuide implements XrGuide {
   #isAnchored = false;
   #fingers: Fingers | undefined;
 
-  constructor(stage: Stage, of: XrStarted, overlay: ArOverlay) {
+  constructor(stage: XrHost, of: XrStarted, overlay: ArOverlay) {
     this.#stage = stage;
     this.#of = of;
     this.#overlay = overlay;

@@ -1,7 +1,7 @@
 /** Loaded where an element has one of the attributes `vr`, `ar` and `measure`. */
 import { css, type ReactiveControllerHost } from 'lit';
 import { Lazy } from '../lazy.js';
-import type { Stage } from '../stage.js';
+import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
 import type { XrOffer } from './xr-offer.js';
 
@@ -32,26 +32,12 @@ const STYLES = css`
   }
 `;
 
-/** What elements have besides while they have `vr` or `ar`: present once their code is. */
-export interface ImmersiveMethods {
-  /** Starts VR, as a click on its button does: call it in the handler of a click, with nothing awaited before it. Rejects with GaussianSplatError `unsupported/xr`, `argument/activation`. */
-  activateVR?(): Promise<void>;
-  /** The same for AR. */
-  activateAR?(): Promise<void>;
-  /** Leaves VR or AR. */
-  exitXR?(): void;
-  /** Whether VR can be started now. */
-  readonly canActivateVR?: boolean;
-  /** Whether AR can be started now. */
-  readonly canActivateAR?: boolean;
-}
-
 export class Extras {
   readonly vr: Lazy<XrOffer>;
   readonly ar: Lazy<XrOffer>;
   readonly measure: Lazy<unknown>;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, stage: Stage) {
+  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost) {
     adoptStyles(element.shadowRoot!, STYLES);
     const place = element.ownerDocument.createElement('div');
     place.className = 'extras';
@@ -82,7 +68,7 @@ export class Extras {
       update,
     );
     const warn = ({ message }: Error): void => stage.warn(message);
-    const find = ({ attributes }: Stage): void => {
+    const find = ({ attributes }: XrHost): void => {
       if (attributes.vr) this.vr.want(warn);
       if (attributes.ar) this.ar.want(warn);
       if (attributes.measure) this.measure.want(warn);

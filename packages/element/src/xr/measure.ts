@@ -3,7 +3,7 @@ import { project } from '../camera/projection.js';
 import { toScene } from '../camera/orbit.js';
 import type { ScenePoint } from '../camera/values.js';
 import type { MeasureDetail } from '../events.js';
-import type { Stage } from '../stage.js';
+import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
 import { languageOf, type ExtraWord } from '../words.js';
 import { unitOf } from './vr.js';
@@ -55,7 +55,7 @@ const DIGITS = 3;
 /** A ruler: two ends on surfaces of the scene, a line, and its length with what it may be off by. */
 export class Measure implements ReactiveController {
   readonly #element: ReactiveControllerHost & HTMLElement;
-  readonly #stage: Stage;
+  readonly #stage: XrHost;
   readonly #place: HTMLElement;
   readonly #button: HTMLButtonElement;
   readonly #drawing: SVGSVGElement;
@@ -65,7 +65,7 @@ export class Measure implements ReactiveController {
   #pressed: readonly [number, number] | undefined;
   #hasKeyboard = false;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, stage: Stage, place: HTMLElement) {
+  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost, place: HTMLElement) {
     this.#element = element;
     this.#stage = stage;
     this.#place = place;
@@ -123,7 +123,7 @@ export class Measure implements ReactiveController {
     surface.addEventListener('focus', () => this.#draw(), { signal });
     surface.addEventListener('blur', () => this.#draw(), { signal });
     this.#element.addEventListener('camera-change', this.#draw, { signal });
-    const observer = new ResizeObserver(() => this.#stage.view && requestAnimationFrame(this.#draw));
+    const observer = new ResizeObserver(() => requestAnimationFrame(this.#draw));
     observer.observe(surface);
     signal.addEventListener('abort', () => observer.disconnect());
     surface.after(this.#drawing, this.#label);

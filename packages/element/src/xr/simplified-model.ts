@@ -1,5 +1,5 @@
 import type { ReactiveController } from 'lit';
-import type { Stage } from '../stage.js';
+import type { XrHost } from './xr-host.js';
 import { languageOf } from '../words.js';
 import { WORDS, type XrOffer } from './xr-offer.js';
 
@@ -9,13 +9,13 @@ const opensModels = (page: Document): boolean =>
 
 /** On iPhones there is no WebXR: the author's own mesh, by its name, if the page has one. */
 export class SimplifiedModel implements ReactiveController {
-  readonly #stage: Stage;
+  readonly #stage: XrHost;
   readonly #place: HTMLElement;
   readonly #offer: XrOffer;
   readonly #link: HTMLAnchorElement;
   readonly #element: HTMLElement;
 
-  constructor(element: HTMLElement, stage: Stage, place: HTMLElement, offer: XrOffer) {
+  constructor(element: HTMLElement, stage: XrHost, place: HTMLElement, offer: XrOffer) {
     this.#stage = stage;
     this.#place = place;
     this.#offer = offer;

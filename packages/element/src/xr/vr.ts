@@ -3,7 +3,7 @@ import { eyeOfPose, type ViewerFrame } from '../camera/orbit.js';
 import { readAttribute } from '../camera/grammar.js';
 import { lengthGrammar, optionalLengthGrammar } from '../camera/lengths.js';
 import { prefersReducedMotion } from '../controllers/motion.js';
-import type { Stage } from '../stage.js';
+import type { XrHost } from './xr-host.js';
 import { openFloor } from '../walk/floor-source.js';
 import { MarkerSplats } from './marker-splats.js';
 import { VrRig } from './vr-rig.js';
@@ -16,7 +16,7 @@ const BACKGROUND = [0.1, 0.1, 0.11, 1] as const;
 const MIN_AREA = 4;
 
 /** The unit of the file, meters. */
-export const unitOf = (stage: Stage): number | undefined =>
+export const unitOf = (stage: XrHost): number | undefined =>
   readAttribute('unit', stage.attributes.unit, optionalLengthGrammar, (sentence) => stage.warn(sentence));
 
 /** Rows of the matrix from the scene's frame to viewer space in meters. */
@@ -35,7 +35,7 @@ export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
   ]);
 
 /** Sessions with a headset that shuts out the room. */
-export const vrKind = (stage: Stage): XrKind => ({
+export const vrKind = (stage: XrHost): XrKind => ({
   ...{ mode: 'immersive-vr', name: 'vr', word: 'vr' },
   isWanted: () => stage.attributes.vr,
   options: () => ({ optionalFeatures: ['local-floor', 'hand-tracking'] }),
@@ -43,7 +43,7 @@ export const vrKind = (stage: Stage): XrKind => ({
   guide: (started) => guideOf(stage, started),
 });
 
-function guideOf(stage: Stage, { session, space, spaceType, signal, gl }: XrStarted): XrGuide {
+function guideOf(stage: XrHost, { session, space, spaceType, signal, gl }: XrStarted): XrGuide {
   const unit = unitOf(stage) ?? 1;
   const { goal } = stage.camera;
   const rig = new VrRig(
@@ -71,7 +71,7 @@ function guideOf(stage: Stage, { session, space, spaceType, signal, gl }: XrStar
   };
 }
 
-async function findFloor(stage: Stage, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
+async function findFloor(stage: XrHost, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
   const { attributes, camera, frame, services, walkable: request, element } = stage;
   const eye = eyeOfPose(camera.goal).map((value) => value * unit) as unknown as Vector3;
   const eyeHeight = readAttribute('eye-height', attributes.eyeHeight, lengthGrammar('1.6m'), () => undefined);

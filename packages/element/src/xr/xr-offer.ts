@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { Stage } from '../stage.js';
+import type { XrHost } from './xr-host.js';
 import type { ExtraWord } from '../words.js';
 import { contextFor, openXrScene, unsupported, type XrContext, type XrScene } from './xr-scene.js';
 import { XrLoop, type XrGuide } from './xr-session.js';
@@ -46,7 +46,7 @@ interface Running {
 
 /** Offers one kind of session: a button where a session can start, the session itself, and its status. */
 export class XrOffer implements ReactiveController {
-  readonly stage: Stage;
+  readonly stage: XrHost;
   readonly kind: XrKind;
   readonly #element: ReactiveControllerHost & HTMLElement;
   readonly #slot: HTMLSlotElement;
@@ -58,7 +58,7 @@ export class XrOffer implements ReactiveController {
   #watching: AbortController | undefined;
   #isWarned = false;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, stage: Stage, place: HTMLElement, kind: XrKind) {
+  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost, place: HTMLElement, kind: XrKind) {
     this.#element = element;
     this.stage = stage;
     this.kind = kind;
