@@ -168,7 +168,7 @@ export type PageMessage =
       readonly type: 'sort';
       readonly port: MessagePort;
       readonly positions: Float32Array;
-      readonly areas: Float32Array;
+      readonly areas?: Float32Array | undefined;
     }
   /** Run a generator once on the CPU, in a worker that is started for it. */
   | CpuRunMessage;

@@ -16,7 +16,7 @@ export interface SortAnswer extends SortRequest {
 }
 
 /** Answers what comes through a port. @param positions [N, 3] @param areas [N] */
-export function sortSplats(port: MessagePort, positions: Float32Array, areas: Float32Array): void {
+export function sortSplats(port: MessagePort, positions: Float32Array, areas: Float32Array | undefined): void {
   const splats = new SplatOrder(positions, areas);
   port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {
     const begin = performance.now();

@@ -67,7 +67,7 @@ export interface DepthSorterOptions {
   /** [N, 3] relative to the scene's origin */
   readonly positions: Float32Array;
   /** Of their largest sections; [N] */
-  readonly areas: Float32Array;
+  readonly areas?: Float32Array | undefined;
   readonly spawn: () => Worker;
   /** Gets each order as it comes; its buffer is only lent. */
   readonly onOrder: (sorted: SortedSplats) => void;
