@@ -6,11 +6,9 @@ import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
-import { CHUNK_NUMBERS } from './pack/chunks.js';
-import { GEOMETRY_WORDS } from './pack/pack.js';
 import { animationBytes, planeCodes, type PackedAnimation } from './pack/pack-animated.js';
-import { shWords } from './pack/sh.js';
 import { AnimateStage } from './stages/animate.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
 const { CULL_GROUP } = constants;
 const PIECES = ['bases', 'sh', 'codes', 'curves'] as const;

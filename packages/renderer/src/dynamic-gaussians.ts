@@ -6,14 +6,12 @@ import * as layouts from './generated/live-layouts.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import { CHUNK_NUMBERS } from './pack/chunks.js';
-import { GEOMETRY_WORDS } from './pack/pack.js';
-import { shWords } from './pack/sh.js';
 import { readPlaces } from './read-places.js';
 import { IngestStage } from './stages/ingest.js';
 import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
 import { cullGroups } from './stages/cull.js';
 import { countBytes, ingestValues, TensorPlaces } from './tensor-places.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
 export interface DynamicGaussiansOptions {
   /** True if the model was trained with opacity compensation for the dilation. Default false. */

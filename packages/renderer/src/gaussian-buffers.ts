@@ -6,10 +6,9 @@ import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { turn } from './gpu/page-thread.js';
 import { MemoryLedger, type Reservation } from './memory-ledger.js';
 import { DETAIL_NUMBERS } from './levels/chunk-detail.js';
-import { CHUNK_NUMBERS } from './pack/chunks.js';
-import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
-import { shWords, type ShPrecision } from './pack/sh.js';
+import { type PackedGaussians } from './pack/pack.js';
 import type { DetailBudgetStage } from './stages/detail-budget.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 export interface UploadOptions {
   /** Bytes of GPU memory that the scene may take; default no limit but the device's. */

@@ -2,8 +2,8 @@ import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
 import type { RenderSettings } from './render-settings.js';
-import type { ShPrecision } from './pack/sh.js';
 import type { DetailBudgetStage } from './stages/detail-budget.js';
+import type { ShPrecision } from './pack/words.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
 export interface GaussianPage {

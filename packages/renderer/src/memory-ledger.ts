@@ -1,8 +1,6 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { constants } from './generated/shaders.js';
-import { CHUNK_NUMBERS } from './pack/chunks.js';
-import { GEOMETRY_WORDS } from './pack/pack.js';
-import { shWords, type ShPrecision } from './pack/sh.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 /** GPU memory that one splat of a scene takes, in bytes, before a single one is uploaded. */
 export function bytesPerSplat(shDegree: ShDegree, shPrecision: ShPrecision): number {

@@ -5,11 +5,11 @@ import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import type { RenderSettings } from './render-settings.js';
-import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
 import type { DetailBudgetStage } from './stages/detail-budget.js';
 import { cameraValues, MAX_FLOAT32 } from './view.js';
 import type { Placement, World } from './world.js';
+import { SH_PRECISION } from './pack/words.js';
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;

@@ -1,7 +1,7 @@
 import { constants } from './generated/shaders.js';
 import type { GaussianPage } from './gaussian-scene.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GEOMETRY_WORDS } from './pack/pack.js';
+import { GEOMETRY_WORDS } from './pack/words.js';
 
 /** Runs of 256 splats that are read at most. */
 const MAX_RUNS = 256;

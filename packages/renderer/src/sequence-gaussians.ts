@@ -2,9 +2,8 @@ import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
-import { CHUNK_NUMBERS } from './pack/chunks.js';
-import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
-import { shWords, type ShPrecision } from './pack/sh.js';
+import { type PackedGaussians } from './pack/pack.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 const { CULL_GROUP } = constants;
 /** More room than the first frame needs. */

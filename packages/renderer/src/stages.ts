@@ -37,7 +37,7 @@ export { MOST_UPLOAD_BYTES, UPLOAD_SHARE, UploadPace } from './streaming/upload-
 export { halfBits } from './pack/half.js';
 export { isOfPlanes, mortonOrder } from './pack/morton.js';
 export { recentred } from './pack/recentre.js';
-export { SH_PRECISION, shWords } from './pack/sh.js';
+export { SH_PRECISION, shWords } from './pack/words.js';
 export { Scratch } from './scratch.js';
 export { CompactStage } from './stages/compact.js';
 export { ComposeStage } from './stages/compose.js';

@@ -12,12 +12,13 @@ export {
 } from './levels/chunk-detail.js';
 export { packFiller, packLevelGeometry, packLevelSh } from './levels/pack-level.js';
 export { chunksOf, emptyLevel, FACTOR_NUMBERS, leafLevel, shNumbers, type SplatLevel } from './levels/splat-level.js';
-export { CHUNK_NUMBERS } from './pack/chunks.js';
+export { CHUNK_NUMBERS } from './pack/words.js';
 export { isOfPlanes, sampleAxis } from './pack/morton.js';
 export { AuxiliaryOutputs } from './rasterizers/auxiliary-outputs.js';
 export { packedOrder } from './pack/pack.js';
 export { recentred } from './pack/recentre.js';
-export { choosePrecision, noiseIn, SCALE_BIAS, SCALE_STEPS, type ShPrecision } from './pack/sh.js';
+export { type ShPrecision } from './pack/words.js';
+export { choosePrecision, noiseIn, SCALE_BIAS, SCALE_STEPS } from './pack/sh.js';
 export { shReader } from './pack/unpack.js';
 export { decodePage } from './streaming/decode-page.js';
 export { finestPages } from './streaming/finest-pages.js';

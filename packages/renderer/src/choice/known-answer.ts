@@ -3,12 +3,12 @@ import { capture } from '../capture.js';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { constants } from '../generated/shaders.js';
 import { packKept, type PackedGaussians } from '../pack/pack.js';
-import type { ShPrecision } from '../pack/sh.js';
 import type { GaussianScene } from '../gaussian-scene.js';
 import type { FrameSettings } from '../frame-target.js';
 import { UncheckedViewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import { sumsAndSorts } from './stages-alone.js';
+import type { ShPrecision } from '../pack/words.js';
 
 /** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
 const TOLERANCE = 0.02;

@@ -1,6 +1,6 @@
 import { constants, layouts } from '../generated/shaders.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { chunksOf, FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
+import { CHUNK_NUMBERS } from '../pack/words.js';
 
 /** Numbers of one `ChunkDetail` of shaders/shared/detail.wgsl. */
 export const DETAIL_NUMBERS = layouts.ChunkDetail.size / 4;

@@ -4,10 +4,10 @@ import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
-import type { ShPrecision } from '../pack/sh.js';
 import type { DetailBudgetStage } from '../stages/detail-budget.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
 import type { PackedLevels } from './packed-levels.js';
+import type { ShPrecision } from '../pack/words.js';
 
 /**
  * A scene on the GPU to which levels of detail have been added: its own splats, where they are, and the coarser ones beside them. With the setting `detail` at 0 the

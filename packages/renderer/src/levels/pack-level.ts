@@ -1,7 +1,8 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { GEOMETRY_WORDS, packShape } from '../pack/pack.js';
-import { packSh, type ShPrecision } from '../pack/sh.js';
+import { packShape } from '../pack/pack.js';
+import { packSh } from '../pack/sh.js';
 import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
+import { GEOMETRY_WORDS, type ShPrecision } from '../pack/words.js';
 
 /** Geometry words of splats `from` to `end` of a level, all of them by default, from splat `first` of `words` on. */
 export function packLevelGeometry(

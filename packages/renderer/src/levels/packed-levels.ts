@@ -1,13 +1,12 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { GEOMETRY_WORDS, packGaussians, type PackedGaussians, type PackOptions } from '../pack/pack.js';
-import { shWords } from '../pack/sh.js';
+import { packGaussians, type PackedGaussians, type PackOptions } from '../pack/pack.js';
 import { buildLevelsAbove, finish } from './build-levels.js';
 import { boundLevel, detailRows, DETAIL_NUMBERS, leafErrors, parentErrors, type ChunkErrors } from './chunk-detail.js';
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
 import { chunksOf, type SplatLevel, FACTOR_NUMBERS, type LevelSource } from './splat-level.js';
 import { shReader, unpackSplat } from '../pack/unpack.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from '../pack/words.js';
 
 /** The splats of a packed scene as the finest level: what made it, file or generator, need not be there any more. */
 export function packedLeaves(packed: PackedGaussians): LevelSource {

@@ -1,8 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { constants, layouts } from '../generated/shaders.js';
+import { constants } from '../generated/shaders.js';
+import { CHUNK_NUMBERS } from './words.js';
 
-/** Numbers of one chunk. */
-export const CHUNK_NUMBERS = layouts.Chunk.size / 4;
 const { CULL_GROUP, ALPHA_MIN } = constants;
 
 /** How far a splat reaches from its centre with an alpha of at least 1/255 along its longest axis, world units. */

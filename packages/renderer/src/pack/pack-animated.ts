@@ -1,5 +1,6 @@
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
-import { packSh, shWords } from './sh.js';
+import { packSh } from './sh.js';
+import { shWords } from './words.js';
 
 /** Attributes that change, in the order of shaders/animate.wgsl. */
 const ATTRIBUTES = ['position', 'rotation', 'scale', 'opacity', 'color'] as const;

@@ -6,12 +6,13 @@ import {
   type ShDegree,
   type Vector3,
 } from '@gaussian-splat/core';
-import { constants, layouts } from '../generated/shaders.js';
+import { constants } from '../generated/shaders.js';
 import { boundChunks } from './chunks.js';
 import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
 import { recentred } from './recentre.js';
-import { choosePrecision, noiseIn, packSh, SH_PRECISION, type ShPrecision } from './sh.js';
+import { choosePrecision, noiseIn, packSh } from './sh.js';
+import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision } from './words.js';
 
 /** How {@link packGaussians} lays out a cloud. */
 export interface PackOptions {
@@ -46,9 +47,6 @@ export interface PackedGaussians {
   /** Splats of the finest level, which come first, if there are levels of detail. */
   readonly leafCount?: number;
 }
-
-/** 32-bit words of one splat's geometry. */
-export const GEOMETRY_WORDS = layouts.PackedGaussian.size / 4;
 
 const { ALPHA_MIN } = constants;
 

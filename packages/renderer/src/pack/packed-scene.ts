@@ -2,9 +2,8 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { readBackWith } from '../gpu/read-back.js';
-import { CHUNK_NUMBERS } from './chunks.js';
-import { GEOMETRY_WORDS, type PackedGaussians } from './pack.js';
-import { shWords } from './sh.js';
+import { type PackedGaussians } from './pack.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './words.js';
 
 const { CULL_GROUP } = constants;
 

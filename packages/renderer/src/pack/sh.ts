@@ -1,11 +1,6 @@
-import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { halfBits } from './half.js';
-
-/** How spherical harmonics are stored: see {@link packSh}. */
-export type ShPrecision = 'int8' | 'float16';
-
-/** The number by which `View.sh_encoding` tells them apart. */
-export const SH_PRECISION: Record<ShPrecision, number> = { int8: 0, float16: 1 };
+import { type ShPrecision, shWords } from './words.js';
 
 /** Coefficients, three channels each, of bands 1, 2 and 3. */
 export const BAND_SIZES = [3, 5, 7] as const;
@@ -82,12 +77,6 @@ export const CODE_NOISE = Float64Array.from(
   { length: MAX_CODE + 1 },
   (_, code) => code && (code < MAX_CODE ? (scaleOf(code) / 127) ** 2 / (48 * Math.PI) : Infinity),
 );
-
-/** 32-bit words of one splat's spherical harmonics: 2, 4, 8, 14 as `int8`, 2, 6, 14, 24 as `float16` for degree 0 to 3. */
-export function shWords(degree: ShDegree, precision: ShPrecision): number {
-  if (precision === 'float16') return 2 * Math.ceil((3 * shCoefficientCount(degree)) / 4);
-  return [2, 4, 8, 14][degree];
-}
 
 /**
  * The coefficients of the splats `kept`, in the order [coefficient][channel], padded to 8 bytes a splat.

@@ -11,13 +11,14 @@ import {
   type Vector3,
 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { CHUNK_NUMBERS, reachOf } from './chunks.js';
+import { reachOf } from './chunks.js';
 import { codesAlong, curveThrough, isOfPlanes, type Curve } from './morton.js';
-import { GEOMETRY_WORDS, packGeometry, usableIndices, type PackedGaussians, type PackOptions } from './pack.js';
+import { packGeometry, usableIndices, type PackedGaussians, type PackOptions } from './pack.js';
 import { recentred } from './recentre.js';
 import { sortByKey } from './radix-sort.js';
-import { noiseIn, packSh, PART, precisionFor, shWords, type ShPrecision } from './sh.js';
+import { noiseIn, packSh, PART, precisionFor } from './sh.js';
 import { unpackSplat } from './unpack.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './words.js';
 
 const { CULL_GROUP } = constants;
 

@@ -1,6 +1,7 @@
 import { shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
-import { GEOMETRY_WORDS, type PackedGaussians } from './pack.js';
-import { BAND_SIZES, FIRST_CODE_BYTE, SCALE_BIAS, SCALE_BYTES, SCALE_STEPS, shWords } from './sh.js';
+import { type PackedGaussians } from './pack.js';
+import { BAND_SIZES, FIRST_CODE_BYTE, SCALE_BIAS, SCALE_BYTES, SCALE_STEPS } from './sh.js';
+import { GEOMETRY_WORDS, shWords } from './words.js';
 
 /** Reads back what pack.ts and sh.ts wrote, as precisely as it was kept. */
 

@@ -1,8 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { halfBits } from '../pack/half.js';
-import { BAND_SIZES, FIRST_CODE_BYTE, SCALE_BYTES, shWords } from '../pack/sh.js';
+import { BAND_SIZES, FIRST_CODE_BYTE, SCALE_BYTES } from '../pack/sh.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from '../levels/chunk-detail.js';
 import { pageLayout, SLOT_CHUNKS } from './manifest.js';
 import {
@@ -21,6 +20,7 @@ import {
   type CodedFile,
 } from './page-coding.js';
 import { putRow, QUANTIZED_CHUNK_WORDS, ROW_CODES } from './quantized-geometry.js';
+import { CHUNK_NUMBERS, shWords } from '../pack/words.js';
 
 const { CULL_GROUP, NO_CHILDREN, QUANTIZED_HEAD_ROWS, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO } = constants;
 const HALF_CODE = 2 ** 24;

@@ -1,5 +1,4 @@
 import { boundsOf, validateCloud, type Bounds, type GaussianCloud } from '@gaussian-splat/core';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { usableIndices, type PackOptions } from '../pack/pack.js';
 import { mortonOrder } from '../pack/morton.js';
 import { recentred } from '../pack/recentre.js';
@@ -7,6 +6,7 @@ import { choosePrecision, noiseIn } from '../pack/sh.js';
 import type { StreamedScene } from './page-source.js';
 import { joinSlots, packRun, type PackedRun } from './pack-run.js';
 import { errorsOfSpacings, spacingOf } from './run-errors.js';
+import { CHUNK_NUMBERS } from '../pack/words.js';
 
 /** A part of a scene whose file has levels of detail of its own. */
 export interface LevelBox {

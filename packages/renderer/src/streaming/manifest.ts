@@ -1,11 +1,9 @@
 import { GaussianSplatError, type Bounds, type ErrorCode, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { GEOMETRY_WORDS } from '../pack/pack.js';
-import { shWords, type ShPrecision } from '../pack/sh.js';
 import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { CLASSES, CLASS_STEP, LEAST_OPACITY_STEP, type PageCoding } from './page-coding.js';
 import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from '../pack/words.js';
 
 /** Chunks that stand for the same one, at most: those of a page, which fill a slot of the pool. */
 export const { SLOT_CHUNKS } = constants;

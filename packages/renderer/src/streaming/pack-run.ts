@@ -1,6 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { boundChunks, CHUNK_NUMBERS } from '../pack/chunks.js';
+import { boundChunks } from '../pack/chunks.js';
 import { packGeometry } from '../pack/pack.js';
 import { packSh } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS } from '../levels/chunk-detail.js';
@@ -8,6 +8,7 @@ import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import { packFiller } from '../levels/pack-level.js';
 import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
 import { chunksOf, leafLevel, type SplatLevel } from '../levels/splat-level.js';
+import { CHUNK_NUMBERS } from '../pack/words.js';
 
 const { CULL_GROUP } = constants;
 

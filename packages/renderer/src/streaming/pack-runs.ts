@@ -1,14 +1,14 @@
 import { validateCloud, type GaussianCloud, type LevelRun } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { GEOMETRY_WORDS, packKept, usableIndices, type PackedGaussians, type PackOptions } from '../pack/pack.js';
+import { packKept, usableIndices, type PackedGaussians, type PackOptions } from '../pack/pack.js';
 import { recentred } from '../pack/recentre.js';
 import { mortonOrder } from '../pack/morton.js';
-import { choosePrecision, noiseIn, shWords, type ShPrecision } from '../pack/sh.js';
+import { choosePrecision, noiseIn } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from '../levels/chunk-detail.js';
 import { packFiller } from '../levels/pack-level.js';
 import { errorsOfSpacings, spacingOf } from './run-errors.js';
 import { chunksOf } from '../levels/splat-level.js';
+import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from '../pack/words.js';
 
 const { CULL_GROUP } = constants;
 

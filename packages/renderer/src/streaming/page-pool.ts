@@ -5,13 +5,13 @@ import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { BLOCK_BYTES, StagingBelt } from '../gpu/staging-belt.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import type { PageList } from './page-list.js';
 import { QUANTIZED } from './quantized-reading.js';
 import { SlotMover } from './slot-mover.js';
 import { chunkLayout, movePoints, numbersOf, startOf, type ChunkLayout, type SlotWords } from './slot-words.js';
+import { CHUNK_NUMBERS } from '../pack/words.js';
 
 const SLOT_SPLATS = SLOT_CHUNKS * constants.CULL_GROUP;
 /** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */

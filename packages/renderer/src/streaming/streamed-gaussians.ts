@@ -3,7 +3,6 @@ import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
-import type { ShPrecision } from '../pack/sh.js';
 import { DetailBudgetStage } from '../stages/detail-budget.js';
 import { ARRIVAL_MS, Arrivals } from './arrivals.js';
 import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
@@ -17,6 +16,7 @@ import type { SlotWords } from './slot-words.js';
 import { UploadPace } from './upload-pace.js';
 import { aheadMs } from './camera-motion.js';
 import { WishReader } from './wish-reader.js';
+import type { ShPrecision } from '../pack/words.js';
 
 export interface PoolOptions {
   /** Bytes of GPU memory for resident splats, up to a 32nd of which uploads pass through, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */

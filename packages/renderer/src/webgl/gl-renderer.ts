@@ -9,7 +9,6 @@ import {
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { constants, layouts } from '../generated/shaders.js';
 import type { StructValues } from '../gpu/struct.js';
-import { SH_PRECISION } from '../pack/sh.js';
 import type { Rgba } from '../frame-target.js';
 import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
 import { cameraValues, MAX_FLOAT32, scaled } from '../view.js';
@@ -29,6 +28,7 @@ import {
   composeVertex,
   fullScreenVertex,
 } from './shaders.js';
+import { SH_PRECISION } from '../pack/words.js';
 
 const { QUAD_BATCH } = constants;
 /** Two triangles. */

@@ -1,5 +1,5 @@
-import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { unpackSplat } from '../pack/unpack.js';
+import { GEOMETRY_WORDS } from '../pack/words.js';
 
 /** Splats that are unpacked at a time. */
 const BLOCK = 1024;
