@@ -7,20 +7,19 @@ export { decibels, meanSquare, type Image } from './measure.js';
 export type { TaskPool } from './parts/task-pool.js';
 export { degreesOf, reduce, splatsOf, toDegree, type Cut, type ReducedCloud } from './reduce.js';
 export { RefiningEvaluator, type RefiningOptions } from './refine/refining-evaluator.js';
-export type { Descent, Rates } from './refine/scene-fitter.js';
+export type { Descent } from './refine/scene-fitter.js';
 export type { LoweredColours, Ranking, Scores } from './score.js';
 export {
   dealtViewsAround,
   dealViews,
   viewsAround,
   viewsBetween,
-  viewsFromEverywhere,
   type DealtViewOptions,
   type DealtViews,
   type ViewOptions,
 } from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';
-export { findSteps, scaledSteps, type FindStepsOptions, type Steps } from './steps.js';
+export { findSteps, type FindStepsOptions, type Steps } from './steps.js';
 export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
 export { filesOfZip } from './write/zip.js';
