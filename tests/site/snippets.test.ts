@@ -58,6 +58,11 @@ declare global {
   const { DynamicGaussians }: typeof drawing;
   const generator: models.Generator;
   const renderer: drawing.Renderer;
+  const gl: WebGL2RenderingContext;
+  const framebuffer: WebGLFramebuffer | null;
+  const view: core.Matrix4;
+  const projection: core.Matrix4;
+  function requestFrame(): void;
 }
 `;
 

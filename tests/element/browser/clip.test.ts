@@ -1,7 +1,7 @@
 /** Clips: one file that is played by byte ranges, with the words of HTMLMediaElement. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, frames, nextEvent, show, showLoaded, until } from './support/harness.js';
+import { assert, assertEqual, atRest, nextEvent, show, showLoaded, until } from './support/harness.js';
 import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
 
 const CLIP = '/net/clip/ball.gsv';
@@ -70,7 +70,8 @@ describe('a clip', () => {
   });
 
   it('waits for what has not come, and goes on from there', async () => {
-    const element = await showLoaded({ src: `${CLIP}?slow=700` });
+    const gate = `clip-${Math.round(performance.timeOrigin)}`;
+    const element = await showLoaded({ src: `${CLIP}?gate=${gate}` });
     const said: string[] = [];
     for (const type of ['waiting', 'playing', 'ended'])
       element.addEventListener(type, () => said.push(`${type} ${element.currentTime.toFixed(1)}`));
@@ -79,6 +80,7 @@ describe('a clip', () => {
     const { currentTime } = element;
     assertEqual(element.readyState, 2, 'readyState');
     assert(currentTime > 0.39 && currentTime < 0.7, `it waits at ${currentTime} s, in the group that is missing`);
+    await fetch(`/net/open/${gate}`);
     await until(() => said.some((each) => each.startsWith('ended')), 'it goes on to the end');
     const order = said.map((each) => each.split(' ')[0]);
     assertEqual(order.slice(0, 3), ['playing', 'waiting', 'playing'], 'events');
@@ -110,7 +112,8 @@ describe('a clip', () => {
     const ended = nextEvent(element, 'ended');
     await element.play();
     await ended;
-    await frames(3);
+    // The image of before fades out.
+    await atRest(element);
     await showsAlone(element, 11);
     assertEqual(errors, 1, 'errors');
   });

@@ -236,13 +236,14 @@ const ANSWERS = {
 
   /**
    * A clip of one ball that changes its colour and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer comes so many milliseconds later;
-   * `lost`: a group that is not there.
+   * `gate`: what follows the first group comes once it is opened; `lost`: a group that is not there.
    */
   async clip(context) {
-    const { frames = '12', whole, slow = '0', lost } = context.query;
+    const { frames = '12', whole, slow = '0', lost, gate } = context.query;
     const { bytes, starts } = await clipOf(Number(frames));
     const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(context.get('Range')) ?? [];
     if (slow !== '0' && Number(first) > 0) await new Promise((resolve) => setTimeout(resolve, Number(slow)));
+    if (gate && Number(first) >= starts[1]) await gateOf(gate).opened;
     if (lost && Number(first) >= starts[Number(lost)] && !(Number(first) >= starts[Number(lost) + 1]))
       return void (context.status = 404);
     context.set('Cache-Control', 'no-store');
