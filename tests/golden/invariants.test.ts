@@ -77,7 +77,7 @@ test('an image of no splats is the background', async () => {
   const camera = cameraAt([0, 0, -3], [0, 0, 0], { width: 7, height: 5 });
   const pixels = await capture(device, renderer, { gaussians, camera, background: [0.25, 0.5, 0.125, 0.75] });
   for (let i = 0; i < pixels.length; i += 4) assert.deepEqual([...pixels.subarray(i, i + 4)], [0.25, 0.5, 0.125, 0.75]);
-  const nothing = { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
+  const nothing = { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0, covered: 0 };
   assert.deepEqual(await renderer.statistics(), nothing);
 });
 

@@ -106,9 +106,10 @@ describe('a clip', () => {
   });
 
   it('a group that cannot be had is told of once, and passed over', async () => {
-    const element = await showLoaded({ src: `${CLIP}?lost=1` });
+    const element = show({ src: `${CLIP}?lost=1` });
     let errors = 0;
     element.addEventListener('generator-error', () => errors++);
+    await element.ready;
     const ended = nextEvent(element, 'ended');
     await element.play();
     await ended;

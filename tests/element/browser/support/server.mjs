@@ -240,13 +240,14 @@ const ANSWERS = {
    */
   async clip(context) {
     const { frames = '12', whole, slow = '0', lost, gate } = context.query;
+    // A refusal, too. A 404 would be of the whole file: browsers give it to requests for other ranges.
+    context.set('Cache-Control', 'no-store');
     const { bytes, starts } = await clipOf(Number(frames));
     const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(context.get('Range')) ?? [];
     if (slow !== '0' && Number(first) > 0) await new Promise((resolve) => setTimeout(resolve, Number(slow)));
     if (gate && Number(first) >= starts[1]) await gateOf(gate).opened;
     if (lost && Number(first) >= starts[Number(lost)] && !(Number(first) >= starts[Number(lost) + 1]))
-      return void (context.status = 404);
-    context.set('Cache-Control', 'no-store');
+      return void (context.status = 416);
     if (first === undefined || whole !== undefined) return void (context.body = Buffer.from(bytes));
     const end = Math.min(bytes.length, Number(last) + 1);
     context.status = 206;
