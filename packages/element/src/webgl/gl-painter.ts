@@ -136,7 +136,8 @@ export class GlPainter implements Painter {
   /** Waits for the order of the first frame, and until the GPU has drawn it. */
   async renderFirst(frame: CanvasFrame): Promise<void> {
     this.#ask(this.#viewOf(frame));
-    await Promise.race([this.#ordered, this.#scene.lost]);
+    // A painter that is destroyed meanwhile gets no order, and the next scene waits for the end of this frame.
+    await Promise.race([this.#ordered, this.#shown, this.#scene.lost]);
     if (this.isLost || this.#isDestroyed) return;
     const begin = performance.now();
     this.#paint(frame);
