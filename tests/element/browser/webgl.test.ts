@@ -204,6 +204,35 @@ describe('renderer="webgl"', () => {
     await until(() => gl.isContextLost(), 'the end of the context');
   });
 
+  it('a scene whose order does not come gives way to the next one', async () => {
+    const original = ElementClass.sceneLoader;
+    const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
+    const script = new URL('/packages/element/dist/loading/scene-worker.js', location.href).href;
+    const code = `addEventListener('message', (event) => { if (event.data.type === 'sort') event.stopImmediatePropagation(); });
+      await import(${JSON.stringify(script)});`;
+    const url = URL.createObjectURL(new Blob([code], { type: 'text/javascript' }));
+    let asked = false;
+    ElementClass.sceneLoader = new Loader(() => {
+      const worker = new Worker(url, { type: 'module' });
+      const post = worker.postMessage.bind(worker) as (message: { type: string }, transfer: Transferable[]) => void;
+      worker.postMessage = (message: { type: string }, transfer: unknown = []) => {
+        if (message.type === 'sort') asked = true;
+        post(message, transfer as Transferable[]);
+      };
+      return worker;
+    });
+    try {
+      const element = show({ src: COMPASS, ...WEBGL });
+      await until(() => asked, 'an order is asked for');
+      element.src = `${COMPASS}?next`;
+      await element.ready;
+      assert(element.loaded, element.error?.message ?? 'loaded');
+    } finally {
+      ElementClass.sceneLoader = original;
+      URL.revokeObjectURL(url);
+    }
+  });
+
   itInLab('where the page refuses workers its own thread sorts', async () => {
     const original = ElementClass.sceneLoader;
     const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
