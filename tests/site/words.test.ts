@@ -1,6 +1,9 @@
 /** The check of words sees what it is for, and leaves code and other senses alone. */
 import assert from 'node:assert/strict';
+import { existsSync, readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 import { blocksOfMarkdown, blocksOfPage, sentencesOf, wordsOf } from '../../scripts/words/prose.mjs';
 import { retiredIn } from '../../scripts/words/terms.mjs';
 
@@ -51,4 +54,34 @@ test('pages: what is shown and what is read aloud, without scripts', () => {
 test('a sentence ends at its stop, not at a colon, and code is one word', () => {
   const sentences = sentencesOf('Write ` here: it counts. Then stop! (So it is.) 3 words follow.');
   assert.deepEqual(sentences.map(wordsOf), [5, 2, 3, 3]);
+});
+
+const root = fileURLToPath(new URL('../../', import.meta.url));
+
+function sources(folder: string): string[] {
+  return readdirSync(join(root, folder), { withFileTypes: true }).flatMap((entry) => {
+    const path = `${folder}/${entry.name}`;
+    if (entry.isDirectory()) return /^(node_modules|dist|cdn|generated)$/.test(entry.name) ? [] : sources(path);
+    return /\.(ts|mjs|py)$/.test(entry.name) ? [path] : [];
+  });
+}
+
+test('documents and sections that errors and comments of the packages name exist', () => {
+  const missing: string[] = [];
+  let count = 0;
+  for (const path of sources('packages')) {
+    const source = readFileSync(join(root, path), 'utf8');
+    for (const { 1: section, 2: document } of source.matchAll(
+      /(?:"([^"\n]+)" in (?:the )?)?((?:docs\/[\w/-]+|\bpackages\/[\w/-]+\/README)\.md)/g,
+    )) {
+      count++;
+      const file = join(root, document);
+      if (!existsSync(file)) missing.push(`${path}: ${document}`);
+      else if (section && !new RegExp(`^#+ ${section}$`, 'm').test(readFileSync(file, 'utf8')))
+        missing.push(`${path}: "${section}" in ${document}`);
+    }
+    if (/README of the /.test(source)) missing.push(`${path}: a README without a path`);
+  }
+  assert.ok(count > 10, `${count} mentions`);
+  assert.deepEqual(missing, []);
 });

@@ -4,11 +4,11 @@
  * Who fails: keys over the bounds of the whole scene: SuperSplat #396 (far splats eat the range), GaussianSplats3D #339; keys of zfar - z as in
  * web-splat, Visionary and WebSplatter: 25 dB with a far plane of 1e6, by a float64 emulation.
  *
- * Recipe: asked for ten splats at 1e5, far planes of 1e6 and infinity, reversed and orthographic projections. Run with the far planes and with 1e10; the
- * projections do not exist here.
+ * Recipe: asked for ten splats at 1e5, far planes of 1e6 and infinity, reversed and orthographic projections. Run with the far planes and with 1e10;
+ * tests/golden/world.test.ts draws orthographic projections.
  *
- * Passes: 59 dB or more with ten splats 100,000 units away, with far planes of 1e6, 1e10 and infinity, while the camera turns. There is no projection
- * matrix, so no reversed one either; cameras are pinholes.
+ * Passes: 59 dB or more with ten splats 100,000 units away, with far planes of 1e6, 1e10 and infinity, while the camera turns. Depth keys
+ * use the distance along the axis, so a reversed projection changes nothing.
  */
 import { test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';

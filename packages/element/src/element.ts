@@ -38,7 +38,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot poster - Shown until the scene is.
  * @slot progress-bar - Shown while the scene loads.
  * @slot interaction-prompt - Shown to visitors who have not touched the scene yet.
- * @slot fallback - Shown where the browser has no WebGPU.
+ * @slot fallback - Shown if neither WebGPU nor WebGL 2 can draw the scene.
  * @slot error - Shown if the scene cannot be.
  * @slot view - Buttons of the page for its views, each with `data-orbit`.
  * @slot hotspot-* - A label of the page at the point of the scene that its `data-position` names.
@@ -61,7 +61,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart control-label - The label.
  * @csspart control-input - The slider, field or button.
  * @csspart control-value - The number beside a slider.
- * @csspart fallback - The default text where there is no WebGPU.
+ * @csspart fallback - The default text if neither WebGPU nor WebGL 2 can draw the scene.
  * @csspart error - The default text after an error.
  * @cssproperty [--poster-fit=cover] - `object-fit` of the poster.
  * @cssproperty [--poster-transition=0.3s] - How long the poster fades.
@@ -84,7 +84,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssstate ready - The scene is shown.
  * @cssstate playing - Its time runs.
  * @cssstate error - It cannot be shown.
- * @cssstate unsupported - It cannot be shown because there is no WebGPU.
+ * @cssstate unsupported - Neither WebGPU nor WebGL 2 can draw the scene in this browser.
  * @fires {CustomEvent<LoadDetail>} load - The first frame is drawn.
  * @fires {ProgressEvent} progress - Bytes have arrived.
  * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is visible while the rest loads.
@@ -138,7 +138,7 @@ export class GaussianSplatElement extends ViewingMethods {
   static sceneLimits: SceneLimits = {};
   /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */
   static runtimeLocation: string | null = null;
-  /** Address of `scene-worker.js`, where a bundler or a server has put it elsewhere; null for the one beside the bundle. Set it before the first scene is loaded. */
+  /** Address of `scene-worker.js`. With null, the default, the npm package starts its worker from a blob URL, and the CDN build loads the file next to its script. Set it before the first scene is loaded. */
   static workerLocation: string | null = null;
   /** Rewrites the absolute addresses of all scenes before they are fetched: for signed URLs and mirrors. */
   static urlModifier: ((url: string) => string) | null = null;

@@ -178,6 +178,6 @@ export function fail(where: string, expected: string, found: unknown): GaussianS
     where,
     expected,
     found: text.length > 120 ? `${text.slice(0, 120)}…` : text,
-    remedy: 'see "Views and flights" in the README of the element',
+    remedy: 'see "Move it by script" in docs/guide/camera.md',
   });
 }

@@ -174,7 +174,7 @@ export class GeneratorSession {
       this.#requireLife();
       if (error instanceof ContractError && isFirst) {
         this.#lastFailure = error;
-        // Nowhere: no second attempt would be another.
+        // A contract error is permanent: a second attempt would fail in the same way.
         this.#failures = Math.max(MAX_FAILURES, this.#failures + 1);
       }
       throw error;
