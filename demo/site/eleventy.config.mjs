@@ -7,7 +7,7 @@ import { join } from 'node:path';
 import { root } from '../../scripts/lib/run.mjs';
 import { documents } from './documents.mjs';
 import { codes } from './codes.mjs';
-import { relativeAddress } from './links.mjs';
+import { pageFolders, relativeAddress } from './links.mjs';
 import { improveMarkdown } from './markdown.mjs';
 import { writePageList } from './page-list.mjs';
 
@@ -24,20 +24,6 @@ const COPIED = {
   'docs/frontier': 'frontier/data',
   'packages/element/cdn': 'cdn',
 };
-const STYLED = [
-  'check',
-  'compare',
-  'docs',
-  'examples',
-  'examples/features',
-  'frontier',
-  'gallery',
-  'playground',
-  'reference',
-  'stability',
-  'three',
-  'without-webgpu',
-];
 /** HTML that is no page of the site: what is built, and what the benchmark frames. */
 const NOT_PAGES = ['demo/dist/**', 'demo/bench/peers/**', 'demo/site/layouts/**'];
 
@@ -48,7 +34,7 @@ export default function configure(eleventy) {
   eleventy.ignores.add('demo/**/*.md');
   eleventy.setServerPassthroughCopyBehavior('copy');
   eleventy.addPassthroughCopy(COPIED);
-  for (const name of STYLED) eleventy.addPassthroughCopy({ [`demo/${name}/*.css`]: name });
+  for (const name of pageFolders) eleventy.addPassthroughCopy({ [`demo/${name}/*.css`]: name });
   eleventy.addPassthroughCopy('demo/generators/**/*.{onnx,json,webp,png}');
   eleventy.addGlobalData('documents', documents);
   for (const document of documents) {

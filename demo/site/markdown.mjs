@@ -3,7 +3,7 @@ import { existsSync } from 'node:fs';
 import { join, posix } from 'node:path';
 import { root } from '../../scripts/lib/run.mjs';
 import { documents } from './documents.mjs';
-import { relativeAddress } from './links.mjs';
+import { pageFolders, relativeAddress } from './links.mjs';
 
 /** Folders and files of the repository that have an address on the site, besides the documents. */
 const ADDRESSES = [
@@ -13,10 +13,7 @@ const ADDRESSES = [
   [/^docs\/stability\/(.+)$/, '/stability/data/$1'],
   [/^docs\/([^/]+\.png)$/, '/docs/$1'],
   [/^demo\/(scenes\/.+|generators\/.+\.(?:onnx|json|webp|png))$/, '/$1'],
-  [
-    /^demo\/(bench|check|compare|examples|examples\/features|frontier|gallery|playground|react|reference|stability|vue|without-webgpu)\/?$/,
-    '/$1/',
-  ],
+  [new RegExp(`^demo/(${pageFolders.join('|')})/?$`), '/$1/'],
 ];
 const urlOfSource = new Map(documents.map(({ source, url }) => [source, url]));
 

@@ -78,7 +78,7 @@ for (const name of libraries) {
 }
 
 /** Most bytes of a tarball. The element's has the CDN build without source maps, and not ONNX Runtime, which is an optional peer; the command's has the element in one file. */
-const MOST_BYTES: Readonly<Record<string, number>> = { element: 1_600_000, cli: 650_000, others: 550_000 };
+const MOST_BYTES: Readonly<Record<string, number>> = { element: 1_600_000, cli: 850_000, others: 550_000 };
 
 test('every tarball has its licence, its README and nothing that weighs', { skip }, (t) => {
   assert.equal(tarballs.length, packages.length);

@@ -24,6 +24,8 @@ export default {
     { title: 'Get started', url: '/docs/guide/start/' },
     { title: 'Generators', url: '/examples/' },
     { title: 'In three.js', url: '/three/' },
+    { title: 'In three.js with WebGL', url: '/three-webgl/' },
+    { title: 'On a map', url: '/map/' },
     { title: 'Without WebGPU', url: '/without-webgpu/' },
     { title: 'Check a generator', url: '/check/' },
     { title: 'React', url: '/react/' },

@@ -102,6 +102,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<FallbackDetail>} generator-fallback - The generator runs on the CPU; `detail.reason` says why.
  * @fires {Event} play - As of HTMLMediaElement, like those that follow.
  * @fires {Event} playing - The time runs.
+ * @fires {Event} waiting - The clip plays, and the frames of this time have not arrived.
  * @fires {Event} pause - The time stands still.
  * @fires {Event} timeupdate - The time has gone on.
  * @fires {Event} seeking - Another time was asked for.
