@@ -1,5 +1,5 @@
 /** Measures a streamed scene: a flight over it, frame after frame, and how far its picture is from one with more splats. */
-import { checkManifest, MemoryLedger, PassTimer, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { checkManifest, MemoryLedger, PassTimer, StreamedGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
 import { compare } from './detail/at-rest.js';
 import { flightCamera } from './detail/flight-path.js';
 import { Second } from './detail/second.js';
@@ -102,14 +102,16 @@ async function measure() {
   report.gpuErrors = environment.errors;
   const { manifest, scene, traffic } = await open(device);
   Object.assign(report, { splats: manifest.splats, pages: scene.progress.total });
-  const renderer = new Renderer(device, { detailFade: number('fade', 0.5) });
-  report.levers = renderer.resolvedSettings;
+  const world = new World();
+  world.add({ scene });
+  const levers = { detail, splatBudget: splats, detailFade: number('fade', 0.5) };
+  const viewpoint = new Viewpoint(device, world, { settings: levers });
+  report.levers = viewpoint.resolvedSettings;
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.STORAGE_BINDING;
   const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage });
-  const levers = { detail, splatBudget: splats };
   const all = {
     device,
-    renderer,
+    viewpoint,
     scene,
     manifest,
     traffic,
@@ -124,7 +126,7 @@ async function measure() {
   const cameraOf = (share) => flightCamera(speed * share, { bounds: manifest.bounds, width, height });
   await fly(all, report.warmUp, 'warm-up', warm, () => cameraOf(0));
   await fly(all, report.flight, 'flight', seconds, cameraOf);
-  report.bytes = { scene: scene.byteLength, renderer: renderer.byteLength, ledger: MemoryLedger.of(device).bytes };
+  report.bytes = { scene: scene.byteLength, renderer: viewpoint.byteLength, ledger: MemoryLedger.of(device).bytes };
   await compare(all, views, report.atRest);
 }
 

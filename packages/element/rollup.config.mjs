@@ -54,7 +54,15 @@ const threeBeside = {
     id === './three.js' && importer?.startsWith(path('./dist/meshes/')) ? { id: THREE, external: true } : null,
 };
 
+/** All arguments of the element's viewpoints are its own: its bundles need no checks. */
+const CHECKS = path('../renderer/dist/checks.js');
+const unchecked = {
+  name: 'unchecked',
+  load: (id) => (id === CHECKS ? `export * from './unchecked.js'` : null),
+};
+
 const sources = [
+  unchecked,
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
   minifyTemplateLiterals({

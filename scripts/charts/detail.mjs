@@ -6,7 +6,7 @@ import { readFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { boundsOf } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { packWithDetail } from '@gaussian-splat/renderer/tools';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cameraAt, decibels, draw, meanSquare, numbers } from './views.mjs';
@@ -26,7 +26,6 @@ const cloud = await readScene(new Uint8Array(readFileSync(values.scene)), { name
 const bounds = boundsOf(cloud);
 const plain = await GaussianBuffers.upload(device, packGaussians(cloud));
 const detailed = await GaussianBuffers.upload(device, packWithDetail(cloud));
-const renderer = new Renderer(device, { rasterizer: 'tiles', threads: 'serial', sort: 'serial' });
 
 console.log(
   `| distance | exact: drawn, for one that contributes | ${numbers(values.detail)
@@ -40,10 +39,10 @@ console.log(
 );
 for (const distance of numbers(values.distances)) {
   const camera = cameraAt(bounds, { width, height }, distance);
-  const exact = await draw(device, renderer, plain, camera);
+  const exact = await draw(device, plain, camera);
   const cells = [];
   for (const detail of numbers(values.detail)) {
-    const { pixels, visible, contributing } = await draw(device, renderer, detailed, camera, detail);
+    const { pixels, visible, contributing } = await draw(device, detailed, camera, detail);
     cells.push(
       `${decibels(meanSquare(exact.pixels, pixels)).toFixed(1)} dB, ${(visible / exact.contributing).toFixed(2)} (${(visible / contributing).toFixed(2)} of its own)`,
     );

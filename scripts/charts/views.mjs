@@ -1,5 +1,6 @@
 /** What the charts of splats drawn against splats that show have in common: views of a scene at growing distances, their pictures, and what shows in them. */
 import { lookAt } from '@gaussian-splat/core';
+import { Viewpoint, World } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 
 /** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits. */
@@ -39,15 +40,18 @@ async function read(device, size, encode) {
 }
 
 /** Draws a view. @returns its pixels, splats drawn, and how many of them show */
-export async function draw(device, renderer, gaussians, camera, detail = 0) {
+export async function draw(device, gaussians, camera, detail = 0) {
   const { width, height } = camera;
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.COPY_SRC;
   const target = device.createTexture({ size: [width, height], format: 'rgba32float', usage });
   const splats = gaussians.pages.reduce((sum, page) => sum + 256 * Math.ceil(page.count / 256), 0);
   const contributions = device.createBuffer({ size: 4 * splats, usage: 0x80 | 0x4 });
-  do renderer.render({ gaussians, camera, target, detail, auxiliary: new AuxiliaryOutputs({ contributions }) });
-  while (!(await renderer.isComplete()));
-  const { visible } = await renderer.statistics();
+  const world = new World();
+  world.add({ scene: gaussians });
+  const viewpoint = new Viewpoint(device, world, { settings: { rasterizer: 'tiles', threads: 'serial', detail } });
+  do viewpoint.draw(camera, { target, auxiliary: new AuxiliaryOutputs({ contributions }) });
+  while (!(await viewpoint.isComplete()));
+  const { visible } = await viewpoint.statistics();
   const weights = await read(device, 4 * splats, (encoder, staging) =>
     encoder.copyBufferToBuffer(contributions, 0, staging, 0, 4 * splats),
   );
@@ -60,7 +64,7 @@ export async function draw(device, renderer, gaussians, camera, detail = 0) {
     const start = (bytesPerRow / 4) * y;
     pixels.set(rows.subarray(start, start + 4 * width), 4 * width * y);
   }
-  [target, contributions].forEach((resource) => resource.destroy());
+  [target, contributions, viewpoint].forEach((resource) => resource.destroy());
   return { pixels, visible, contributing: weights.reduce((sum, weight) => sum + (weight >= LEAST_WEIGHT ? 1 : 0), 0) };
 }
 

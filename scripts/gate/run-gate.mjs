@@ -14,7 +14,8 @@ import {
   deviceDescriptor,
   GaussianBuffers,
   packGaussians,
-  Renderer,
+  Viewpoint,
+  World,
   startVariants,
 } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
@@ -121,19 +122,21 @@ async function draw(device, cloud, views, name) {
   const folder = join(values.work, 'images', name.replace(/\W+/g, '-'));
   mkdirSync(folder, { recursive: true });
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
-  const renderer = new Renderer(device);
+  const world = new World();
+  world.add({ scene: gaussians });
+  const viewpoint = new Viewpoint(device, world);
   const paths = [];
   try {
     for (const { id, camera } of views) {
       const { width, height } = camera;
-      const pixels = await capture(device, renderer, { gaussians, camera, background: [0, 0, 0, 1] });
+      const pixels = await capture(device, viewpoint, { camera, over: [0, 0, 0, 1] });
       const png = new PNG({ width, height });
       for (let k = 0; k < 4 * width * height; k++) png.data[k] = Math.round(255 * Math.min(1, Math.max(0, pixels[k])));
       paths.push(join(folder, `${id}.png`));
       writeFileSync(paths.at(-1), PNG.sync.write(png));
     }
   } finally {
-    renderer.destroy();
+    viewpoint.destroy();
     gaussians.destroy();
   }
   return paths;

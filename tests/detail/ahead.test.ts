@@ -2,13 +2,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Camera } from '@gaussian-splat/core';
-import { Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { StreamedGaussians } from '@gaussian-splat/renderer';
 import { detailFolder } from '../support/detail-folder.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
 import { FlightPages } from '../support/flight-pages.js';
 import { anyDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 const DETAIL = 0.5;
 const folder = detailFolder(pebbles(20_000));

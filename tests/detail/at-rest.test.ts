@@ -3,13 +3,14 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
 import type { Camera, Vector3 } from '@gaussian-splat/core';
-import { Renderer, StreamedGaussians, type StreamOptions } from '@gaussian-splat/renderer';
+import { StreamedGaussians, type StreamOptions } from '@gaussian-splat/renderer';
 import { constants, listPages, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { detailFolder } from '../support/detail-folder.js';
 import { onlyInLab, someOf } from '../support/extent.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 const SLOT_BYTES = 4 * SLOT_CHUNKS * (8 + 12 + constants.CULL_GROUP * (8 + 4));
 const lens = { width: 96, height: 64, fovXDegrees: 60, near: 0.01 };

@@ -9,7 +9,7 @@ import {
   type GaussianCloud,
   type ShDegree,
 } from '@gaussian-splat/core';
-import { checkManifest, GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { checkManifest, GaussianBuffers, packGaussians, StreamedGaussians } from '@gaussian-splat/renderer';
 import { cloudOfChunks, decodePage } from '@gaussian-splat/renderer/tools';
 import { constants, pageLayout } from '@gaussian-splat/renderer/stages';
 import {
@@ -33,6 +33,7 @@ import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 after(endNodeDevice);
 

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Vector3 } from '@gaussian-splat/core';
-import { Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { StreamedGaussians } from '@gaussian-splat/renderer';
 import { constants, listPages, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { detailFolder } from '../support/detail-folder.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
@@ -10,6 +10,7 @@ import { anyDevice } from '../support/node-device.js';
 import { readBuffer, readRows } from '../support/read-rows.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 /** Words of a chunk's box, of its details, and of the geometry and harmonics (degree 1) of its splats: docs/detail-pages.md. */
 const [BOX, DETAILS, GEOMETRY, SH] = [8, 12, 8 * constants.CULL_GROUP, 4 * constants.CULL_GROUP];

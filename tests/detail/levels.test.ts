@@ -4,7 +4,7 @@ import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
 import { GaussianSplatError, keepUsable, type Camera } from '@gaussian-splat/core';
 import { readScene, SogFiles } from '@gaussian-splat/formats';
-import { GaussianBuffers, Renderer, StreamedGaussians, type PageSource } from '@gaussian-splat/renderer';
+import { GaussianBuffers, StreamedGaussians, type PageSource } from '@gaussian-splat/renderer';
 import { levelSource, packLevelPage, packLevelRuns } from '@gaussian-splat/renderer/tools';
 import { constants, NONE, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
@@ -19,6 +19,7 @@ import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 const { CULL_GROUP } = constants;
 /** Pixels that flights allow. */

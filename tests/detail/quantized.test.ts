@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
 import { boundsOf, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, StreamedGaussians } from '@gaussian-splat/renderer';
 import {
   constants,
   leafLevel,
@@ -25,6 +25,7 @@ import { readQuantizedChunk } from '../support/quantized-twin.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 after(endNodeDevice);
 

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { keepUsable, type Camera, type GaussianCloud, type LevelRun } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { packLevelRuns } from '@gaussian-splat/renderer/tools';
 import { constants, DETAIL_NUMBERS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
@@ -13,6 +13,7 @@ import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 const { CULL_GROUP } = constants;
 

@@ -8,7 +8,6 @@ import {
   GaussianBuffers,
   MemoryLedger,
   packGaussians,
-  Renderer,
   StreamedGaussians,
 } from '@gaussian-splat/renderer';
 import { packWithDetail, readPacked } from '@gaussian-splat/renderer/tools';
@@ -24,6 +23,7 @@ import { readFrame } from '../support/read-frame.js';
 import { readRows } from '../support/read-rows.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 const cloud = pebbles(20_000);
 const folder = detailFolder(cloud);

@@ -4,7 +4,6 @@ import { after, before, test } from 'node:test';
 import { boundsOf, eyeOf, GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { dealtViewsAround, decibels, economise, meanSquare, RefiningEvaluator } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
-import { Renderer } from '@gaussian-splat/renderer';
 import { readBack } from '@gaussian-splat/renderer/tools';
 import { CloudBuffers } from '../../packages/economise/src/gpu/cloud-buffers.js';
 import { PictureErrors } from '../../packages/economise/src/gpu/picture-errors.js';
@@ -14,6 +13,7 @@ import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cpuPainter, PaintedEvaluator } from './twin/index.js';
+import { Renderer } from '../support/renderer.js';
 
 const SIZE = 32;
 const DEGREE = 1;

@@ -21,9 +21,10 @@ import {
   type InputNumbers,
   type Inputs,
 } from '@gaussian-splat/generator';
-import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { onlyInLab } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const root = fileURLToPath(new URL('../../demo/generators/', import.meta.url));
 const names = readdirSync(root).filter((name) => existsSync(`${root}${name}/model.onnx`));

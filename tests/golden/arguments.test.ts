@@ -2,10 +2,11 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { cameraFromCalibration, type CalibratedView } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, Renderer, type FrameRequest } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { cloudOf } from '../support/clouds.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
+import { capture, Renderer, type FrameRequest } from '../support/renderer.js';
 
 const camera = cameraAt([0, 0, -4], [0, 0, 0], { width: 32, height: 24 });
 const columnMajor = Array.from({ length: 16 }, (_, k) => camera.worldToCamera[4 * (k % 4) + Math.floor(k / 4)]);
@@ -13,8 +14,6 @@ const columnMajor = Array.from({ length: 16 }, (_, k) => camera.worldToCamera[4 
 const flat = Array.from(camera.worldToCamera, (x, k) => (k >= 4 && k < 8 ? camera.worldToCamera[k - 4] : x));
 
 const FAULTY: readonly (readonly [name: string, changes: object, code: string])[] = [
-  ['no scene', { gaussians: undefined }, 'argument/value'],
-  ['a list with a gap', { gaussians: [undefined] }, 'argument/value'],
   ['levers that are null', { settings: null }, 'argument/value'],
   ['a background of three numbers', { background: [0, 0, 0] }, 'argument/value'],
   ['a background that is not a number', { background: [0, 0, NaN, 1] }, 'argument/value'],

@@ -11,12 +11,13 @@ import {
   readClipPart,
   type ClipPartContent,
 } from '@gaussian-splat/formats';
-import { AnimatedGaussians, capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { AnimatedGaussians, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { packAnimation, type PackedAnimation } from '@gaussian-splat/renderer/tools';
 import { clipOf } from '../support/clips.js';
 import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { fountain } from '../support/scenes/fountain.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const LIMIT_DB = 59;
 const FRAMES = 16;

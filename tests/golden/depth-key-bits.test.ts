@@ -3,13 +3,14 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { resized, room } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 /** The image of a camera that has just turned: only then are the visible splats sorted by short keys. */
 async function renderTurning(cloud: GaussianCloud, camera: Camera, depthKeyBits: 16 | 24 | 32): Promise<Float32Array> {

@@ -4,13 +4,14 @@ import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
 import { boundsOf, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { DetailedGaussians, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DetailedGaussians, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { buildPackedLevels, packWithDetail } from '@gaussian-splat/renderer/tools';
 import { psnr } from '../support/metrics.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
+import { Renderer } from '../support/renderer.js';
 
 const size = { width: 120, height: 80, fovXDegrees: 60 };
 const serial = { threads: 'serial', sort: 'serial' } as const;

@@ -1,12 +1,13 @@
 /** Each rule of the low-pass filter, carried by the scene, against the float64 oracle. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle, type Mode } from '../oracle/oracle.js';
 import { RULES } from '../oracle/rules.js';
 import { closeness } from '../support/compare.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { proceduralScenes } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 after(endNodeDevice);
 

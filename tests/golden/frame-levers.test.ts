@@ -1,13 +1,7 @@
 /** Settings of single frames: the same picture as of a renderer that has them for good, and nothing made on the way. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import {
-  GaussianBuffers,
-  packGaussians,
-  Renderer,
-  type PerFrameSettings,
-  type RasterizerName,
-} from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type PerFrameSettings, type RasterizerName } from '@gaussian-splat/renderer';
 import { SpanTimer } from '@gaussian-splat/renderer/tools';
 import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
@@ -18,6 +12,7 @@ import { asOnSwiftShader, endNodeDevice, serialDevice } from '../support/node-de
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
+import { Renderer } from '../support/renderer.js';
 
 const MIXES: readonly Partial<PerFrameSettings>[] = [
   { depthKeyBits: 16, resolutionScale: 0.6, shDegree: 0 },

@@ -2,12 +2,12 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { RendererOptions } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { compareWithOracle } from '../support/compare.js';
 import { anyDevice, asOnSwiftShader, endNodeDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
+import type { RendererOptions } from '../support/renderer.js';
 
 const camera = cameraAt([0, 0, -3], [0, 0, 0], { width: 64, height: 64 });
 

@@ -3,11 +3,12 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { gaussianLayout, type Contract, type SplitOutputs } from '@gaussian-splat/core/contract';
 import type { OnnxTensor } from '@gaussian-splat/core/onnx';
-import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { headerWith, tensor } from '../contract/support.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { resized, room } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const COUNT = 300;
 const { uniform } = seededRandom(11);

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { capture, DynamicGaussians, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { mortonOrder } from '@gaussian-splat/renderer/stages';
 import { writeTensors, type TensorSpec, type WrittenTensors } from '../support/generator-tensors.js';
 import { someOf } from '../support/extent.js';
@@ -19,6 +19,7 @@ import {
   thinned,
 } from '../support/scenes.js';
 import type { Scene } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const LIMIT_DB = 55;
 let made: Scene | undefined;

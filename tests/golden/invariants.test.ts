@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, Renderer, type PackedGaussians } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import { renderOracle } from '../oracle/oracle.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, renderCloud } from '../support/compare.js';
@@ -11,6 +11,7 @@ import { onlyInFull } from '../support/extent.js';
 import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { randomSource } from '../support/gpu.js';
 import { cameraAt, equalDepthPlane, movedBy, offCentre, resized, room, withHostileSplats } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const sameBytes = (a: Float32Array, b: Float32Array): boolean =>
   Buffer.compare(

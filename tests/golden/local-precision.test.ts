@@ -2,13 +2,14 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle } from '../oracle/oracle.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness } from '../support/compare.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 /** A small thing that shines by strong harmonics, among a hundred times as many dull splats elsewhere. */
 function shinyThing(strength: number): GaussianCloud {

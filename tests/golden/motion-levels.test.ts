@@ -3,13 +3,14 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { boundsOf, lookAt, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { LEAST_DECIBELS } from '../../packages/element/src/pace/ladder.js';
 import { addLoss, decibelsOf } from '../../packages/element/src/pace/loss.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { isLab } from '../support/extent.js';
 import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 after(endNodeDevice);
 

@@ -2,13 +2,14 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs, packedOrder } from '@gaussian-splat/renderer/tools';
 import { toCamera, worldPosition } from '../oracle/projection.js';
 import { renderOracle } from '../oracle/oracle.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { resized, room } from '../support/scenes.js';
+import { Renderer } from '../support/renderer.js';
 
 async function readBuffer(device: GPUDevice, source: GPUBuffer | GPUTexture): Promise<Float32Array> {
   const isTexture = 'createView' in source;

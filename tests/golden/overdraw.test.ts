@@ -5,8 +5,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, settings, World } from '@gaussian-splat/renderer';
-import { UncheckedViewpoint } from '@gaussian-splat/renderer/tools';
+import { capture, GaussianBuffers, packGaussians, settings, Viewpoint, World } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
@@ -35,12 +34,12 @@ async function viewpointOf(
   cloud: GaussianCloud,
   rasterizer: 'quads' | 'tiles',
   limitsOverdraw: boolean,
-): Promise<{ viewpoint: UncheckedViewpoint; incomplete(): number; end(): void }> {
+): Promise<{ viewpoint: Viewpoint; incomplete(): number; end(): void }> {
   let told = 0;
   const world = new World();
   const scene = await GaussianBuffers.upload(device, packGaussians(cloud));
   world.add({ scene });
-  const viewpoint = new UncheckedViewpoint(device, world, {
+  const viewpoint = new Viewpoint(device, world, {
     settings: settings('default', { rasterizer }),
     limitsOverdraw,
     onIncomplete: () => told++,

@@ -3,17 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import {
-  capture,
-  GaussianBuffers,
-  packGaussians,
-  Renderer,
-  SceneDepth,
-  settings,
-  Viewpoint,
-  World,
-  type RendererOptions,
-} from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, SceneDepth, settings, Viewpoint, World } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 import { renderOracle, renderOracleWorld, toRgba, type Mode } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
@@ -27,6 +17,7 @@ import { seededRandom } from '../support/random.js';
 import { readTexture } from '../support/read-frame.js';
 import { cameraAt, edgeOnDiscs, needles, resized, room } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
+import { capture, Renderer, type RendererOptions } from '../support/renderer.js';
 
 after(endNodeDevice);
 

@@ -2,11 +2,12 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, Renderer, type RasterizerName } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type RasterizerName } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 /** 1500 balls of all opacities around the origin. */
 function randomCloud(): GaussianCloud {

@@ -2,14 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import {
-  capture,
-  GaussianBuffers,
-  packGaussians,
-  Renderer,
-  type Quality,
-  type RendererOptions,
-} from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type Quality } from '@gaussian-splat/renderer';
 import { readScene } from '@gaussian-splat/formats';
 import { readFileSync } from 'node:fs';
 import type { OracleImage } from '../oracle/blend.js';
@@ -21,6 +14,7 @@ import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt, resized, room } from '../support/scenes.js';
 import { stressScenes } from '../support/scenes/stress.js';
 import { yawed } from '../stability/support/pictures.js';
+import { capture, Renderer, type RendererOptions } from '../support/renderer.js';
 
 /** dB against the oracle: of any scene, and of captured ones. */
 const LIMITS: Record<Quality, number> = { reference: 75, default: 59, balanced: 42, fast: 36 };

@@ -4,7 +4,7 @@
  */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { GaussianBuffers, packGaussians, Renderer, type RasterizerName } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type RasterizerName } from '@gaussian-splat/renderer';
 import { faultyDevice } from '../stability/support/devices.js';
 import { notFinite, turnedAway } from '../stability/support/pictures.js';
 import { cloudOf, repeat } from '../support/clouds.js';
@@ -14,6 +14,7 @@ import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
+import { Renderer } from '../support/renderer.js';
 
 /** Eight roundings of float32. */
 const MOVE = 1e-6;

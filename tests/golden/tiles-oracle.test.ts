@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, compareWithOracle, describeCloseness, renderCloud } from '../support/compare.js';
@@ -19,6 +19,7 @@ import {
   opacityLadder,
   resized,
 } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 /** Colours around 4 cost more in a float16 target than those around 1. */
 const LIMITS = { psnr: 69, p999: 0.5 / 255 };

@@ -2,13 +2,14 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle } from '../oracle/oracle.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt, offCentre, resized, room } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 /** The camera moved along its own axes (right, down, forward) and then turned to the right by an angle in radians. */
 function moved({ worldToCamera: m, ...camera }: Camera, [x, y, z]: readonly number[], angle = 0): Camera {

@@ -2,22 +2,14 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as delay } from 'node:timers/promises';
-import {
-  capture,
-  autotune,
-  createRenderer,
-  GaussianBuffers,
-  packGaussians,
-  Renderer,
-  startVariants,
-  type Variants,
-} from '@gaussian-splat/renderer';
+import { autotune, GaussianBuffers, packGaussians, startVariants, type Variants } from '@gaussian-splat/renderer';
 import { givesKnownAnswer, mortonOrder, packSpheres, ROUNDS, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull, onlyInLab } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 test('serial and parallel stages draw the same bytes, moving and turning', async () => {
   const device = await nodeDevice();
@@ -104,7 +96,8 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
     const anew = await autotune(device, { store });
     await assertSuits(device, anew);
     assert.deepEqual(JSON.parse(entries.get(key)!), anew, damage);
-    const renderer = await createRenderer(device);
+    await autotune(device);
+    const renderer = new Renderer(device);
     assert.equal(renderer.resolvedSettings.threads, anew.threads);
     assert.equal(renderer.resolvedSettings.rasterizer, anew.rasterizer);
     renderer.destroy();

@@ -11,10 +11,8 @@ import {
   DynamicGaussians,
   GaussianBuffers,
   packGaussians,
-  Renderer,
   StreamedGaussians,
   type GaussianScene,
-  type RendererOptions,
 } from '@gaussian-splat/renderer';
 import { packWithDetail } from '@gaussian-splat/renderer/tools';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
@@ -25,6 +23,7 @@ import { cameraAt, room, thinned } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 import { onlyInLab } from '../support/extent.js';
 import { countWork } from '../support/work-counters.js';
+import { Renderer, type RendererOptions } from '../support/renderer.js';
 
 type Figures = Readonly<Record<string, number>>;
 

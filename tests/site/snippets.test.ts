@@ -57,7 +57,7 @@ declare global {
   const encoder: GPUCommandEncoder;
   const { DynamicGaussians }: typeof drawing;
   const generator: models.Generator;
-  const renderer: drawing.Renderer;
+  const viewpoint: drawing.Viewpoint;
   const gl: WebGL2RenderingContext;
   const framebuffer: WebGLFramebuffer | null;
   const view: core.Matrix4;

@@ -14,12 +14,13 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import fc from 'fast-check';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
 import { nodeDevice } from '../support/node-device.js';
 import { offCentre } from '../support/scenes.js';
 import { differingBytes, resized, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const SPEC = {
   layout: 'packed',

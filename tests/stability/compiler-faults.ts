@@ -12,19 +12,13 @@
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import {
-  capture,
-  autotune,
-  createRenderer,
-  GaussianBuffers,
-  packGaussians,
-  type Variants,
-} from '@gaussian-splat/renderer';
+import { autotune, GaussianBuffers, packGaussians, type Variants } from '@gaussian-splat/renderer';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
 import { offCentre } from '../support/scenes.js';
 import type { Miscompilation } from '../support/miscompilation.js';
 import { faultyDevice, fullDevice } from './support/devices.js';
 import { compareImage, resized, truth } from './support/pictures.js';
+import { capture, Renderer } from '../support/renderer.js';
 import { fullTest, holds, note, sized } from './support/row.js';
 
 /** What a compiler does to a stage, and what must be chosen in its place. */
@@ -44,7 +38,8 @@ const FAULTS: readonly { name: string; fault: Miscompilation; expected: Partial<
 async function drawAsChosen(device: GPUDevice): Promise<number> {
   const { cloud, cameras } = offCentre();
   const camera = resized(cameras[0], 96);
-  const renderer = await createRenderer(device);
+  await autotune(device);
+  const renderer = new Renderer(device);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const { psnr } = compareImage(await capture(device, renderer, { gaussians, camera }), truth(cloud, camera));
   renderer.destroy();
@@ -77,11 +72,7 @@ test('matrices transposed in every variant: an error, not a wrong picture', asyn
     { shader: /gs\./, from: 'return to_camera * (', to: 'return transpose(to_camera) * (' },
   ]);
   await assert.rejects(autotune(device, { store: null }), { code: 'unsupported/wrong-image' });
-  await assert.rejects(
-    createRenderer(device),
-    { code: 'unsupported/wrong-image' },
-    'and again, without a second probe',
-  );
+  await assert.rejects(autotune(device), { code: 'unsupported/wrong-image' }, 'and again, without a second probe');
   assert.ok(befallen.includes('gs.project'), befallen.join());
   device.destroy();
 });

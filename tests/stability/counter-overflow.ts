@@ -11,7 +11,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import fc from 'fast-check';
-import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { runCase } from '../support/gpu.js';
 import { nodeDevice } from '../support/node-device.js';
@@ -20,6 +20,7 @@ import { cameraAt } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { THREADS } from './support/pictures.js';
 import { fullTest, holds, sized } from './support/row.js';
+import { Renderer } from '../support/renderer.js';
 
 const MOST = 0xffffffff;
 

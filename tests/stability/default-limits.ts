@@ -11,7 +11,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { capture, DynamicGaussians, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { GpuMemory } from '@gaussian-splat/renderer/stages';
 import { writeTensors } from '../support/generator-tensors.js';
 import { nodeDevice } from '../support/node-device.js';
@@ -20,6 +20,7 @@ import { spreadOver, visiblePart } from './support/large-scene.js';
 import { watchMemory } from './support/ledger.js';
 import { compareImage, truth, THREADS } from './support/pictures.js';
 import { fullTest, holds } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 // In npm test, tests/golden/invariants.test.ts draws 3 million splats with harmonics at default limits.
 for (const millions of [10, 20]) {

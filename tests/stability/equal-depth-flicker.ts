@@ -10,13 +10,14 @@
  * Passes: 0 differing bytes in 200 frames of a plane of splats (a million in the full run), also with turns between them.
  */
 import { test } from 'node:test';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
 import { differingBytes, RASTERIZERS, yawed, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const SPLATS = sized(20_000, 1_000_000);
 const FRAMES = { quads: sized(20, 200), tiles: sized(4, 200) };

@@ -12,11 +12,12 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import fc from 'fast-check';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { nodeDevice } from '../support/node-device.js';
 import { offCentre } from '../support/scenes.js';
 import { compareImage, differingBytes, RASTERIZERS, truth, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const { cloud, cameras } = offCentre();
 const sizedTo = (width: number, height: number) => ({

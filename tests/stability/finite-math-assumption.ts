@@ -11,12 +11,13 @@
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import { capture, GaussianBuffers, packGaussians, Renderer, type PackedGaussians } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import { nodeDevice } from '../support/node-device.js';
 import { offCentre } from '../support/scenes.js';
 import { differingBytes, notFinite, RASTERIZERS, resized, THREADS } from './support/pictures.js';
 import { holds } from './support/row.js';
 import { shaderTexts } from './support/sources.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 test('shaders ask bits, not floats, whether a number is one', () => {
   const texts = shaderTexts();

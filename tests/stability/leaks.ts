@@ -10,13 +10,14 @@
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import { capture, DynamicGaussians, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
 import { offCentre } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { watchMemory } from './support/ledger.js';
 import { resized, yawed, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const SPEC = {
   layout: 'packed',

@@ -11,13 +11,14 @@
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { offCentre } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { compareImage, differingBytes, RASTERIZERS, resized, truth } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
 import { shaderTexts } from './support/sources.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 test('each feature removed, then all', async () => {
   const adapter = await requestNodeAdapter();

@@ -14,15 +14,7 @@ import assert from 'node:assert/strict';
 import { setTimeout as delay } from 'node:timers/promises';
 import fc from 'fast-check';
 import type { Camera } from '@gaussian-splat/core';
-import {
-  capture,
-  DynamicGaussians,
-  GaussianBuffers,
-  packGaussians,
-  Renderer,
-  type GaussianScene,
-  type RendererOptions,
-} from '@gaussian-splat/renderer';
+import { DynamicGaussians, GaussianBuffers, packGaussians, type GaussianScene } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
 import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
@@ -31,6 +23,7 @@ import { offCentre } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { resized, rolled, yawed, THREADS } from './support/pictures.js';
 import { fullTest, holds, sized } from './support/row.js';
+import { capture, Renderer, type RendererOptions } from '../support/renderer.js';
 
 const SPEC = {
   layout: 'packed',

@@ -12,7 +12,7 @@
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
@@ -20,6 +20,7 @@ import { cameraAt } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { compareImage, differingBytes, notFinite, RASTERIZERS, truth, THREADS } from './support/pictures.js';
 import { fullTest, holds, note, sized } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const random = seededRandom(9);
 const fullScreen = (count: number) =>

@@ -12,13 +12,14 @@
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
 import { compareImage, differingBytes, notFinite, truth, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 test('ten times the room, at once', async () => {
   const device = await nodeDevice();

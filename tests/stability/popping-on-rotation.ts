@@ -15,7 +15,7 @@
 import { test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle, toRgba } from '../oracle/oracle.js';
 import { toCamera, worldPosition } from '../oracle/projection.js';
 import { referenceViews } from '../support/cameras.js';
@@ -27,6 +27,7 @@ import { nodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
 import { resized, rolled, yawed, THREADS } from './support/pictures.js';
 import { chart, holds, note, sized } from './support/row.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const scene = room();
 const cloud = scene.cloud;

@@ -11,7 +11,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import fc from 'fast-check';
-import { capture, GaussianBuffers, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers } from '@gaussian-splat/renderer';
 import { dispatchGrid } from '@gaussian-splat/renderer/stages';
 import { nodeDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
@@ -19,6 +19,7 @@ import { spreadOver, visiblePart } from './support/large-scene.js';
 import { compareImage, truth, yawed, THREADS } from './support/pictures.js';
 import { fullTest, holds } from './support/row.js';
 import { loopBodies, shaderTexts } from './support/sources.js';
+import { capture, Renderer } from '../support/renderer.js';
 
 const visible = visiblePart(2000);
 const camera = cameraAt([0, 0, -2], [0, 0, 0], { width: 120, height: 90 });

@@ -1,8 +1,9 @@
 /** The renderer's float image of a cloud, held against the oracle's. */
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle, type Mode, type OracleImage } from '../oracle/oracle.js';
 import { maxAbs, percentile, psnr } from './metrics.js';
+import { capture, Renderer, type RendererOptions } from './renderer.js';
 
 /** How close an image is to the oracle's, over the pixels that any splat covers, before any rounding to 8 bits. */
 export interface Closeness {

@@ -1,6 +1,7 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import type { StreamedGaussians } from '@gaussian-splat/renderer';
 import { anyDevice } from './node-device.js';
+import type { Renderer } from './renderer.js';
 
 /** Frames in a row in which nothing comes any more, and frames at most. */
 const CALM = 10;

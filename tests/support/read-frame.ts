@@ -1,4 +1,4 @@
-import type { FrameRequest, Renderer } from '@gaussian-splat/renderer';
+import type { FrameRequest, Renderer } from './renderer.js';
 
 /**
  * One frame as a renderer draws it at this moment, in float32: unlike `capture` it is never drawn again.

@@ -64,7 +64,7 @@ export class Second {
   #camera;
   #before;
 
-  /** @param all with the device, the renderer, the scene, the target, `levers` of each frame and the traffic of files */
+  /** @param all with the device, the viewpoint, the scene, the target, `levers` of each frame and the traffic of files */
   constructor(all, timer) {
     this.#all = all;
     this.#timer = timer;
@@ -77,11 +77,11 @@ export class Second {
 
   /** Draws a frame, and waits until less than {@link IN_FLIGHT} are left to draw. */
   async draw(camera) {
-    const { device, renderer, scene, target, levers } = this.#all;
+    const { device, viewpoint, scene, target, levers } = this.#all;
     const begun = performance.now();
-    renderer.render({ gaussians: scene, camera, target, ...levers, timer: this.#timer });
+    viewpoint.draw(camera, { target, timer: this.#timer }, levers);
     this.#encoding.push(performance.now() - begun);
-    this.#bytes = Math.max(this.#bytes, scene.byteLength + renderer.byteLength);
+    this.#bytes = Math.max(this.#bytes, scene.byteLength + viewpoint.byteLength);
     if (this.#camera) {
       const seconds = Math.max(1e-3, begun - this.#begun.at(-1)) / 1000;
       this.#turning.push(degreesBetween(this.#camera, camera) / seconds);
@@ -132,7 +132,7 @@ export class Second {
 
   /** Sends for what the GPU knows of the frames since the last look. */
   #look() {
-    this.#looks.push(this.#all.renderer.statistics());
+    this.#looks.push(this.#all.viewpoint.statistics());
     if (this.#timer) this.#passes.push(this.#timer.read());
   }
 }

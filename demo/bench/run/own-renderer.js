@@ -1,5 +1,5 @@
 /** Our renderer as a subject (see measure.js): one configuration of it, drawing into an off-screen texture. */
-import { PassTimer, Renderer } from '@gaussian-splat/renderer';
+import { PassTimer, Viewpoint, World } from '@gaussian-splat/renderer';
 import { watchOptions } from './levers.js';
 import { readPixels } from './read-pixels.js';
 
@@ -8,7 +8,7 @@ const PRECISE = 'rgba32float';
 
 export class OwnRenderer {
   #device;
-  #renderer;
+  #viewpoint;
   #gaussians;
   #timer;
   #target;
@@ -22,7 +22,9 @@ export class OwnRenderer {
     const watched = watchOptions(resolutionScale === 1 ? options : { resolutionScale, ...options });
     this.#device = device;
     this.#gaussians = buffers;
-    this.#renderer = new Renderer(device, watched.options);
+    const world = new World();
+    for (const scene of buffers) world.add({ scene });
+    this.#viewpoint = new Viewpoint(device, world, { settings: watched.options });
     this.#unread = () => [...watched.unread(), ...ignored];
     this.#target = makeTarget(device, DISPLAY, { width, height });
     if (device.features.has('timestamp-query')) {
@@ -63,19 +65,19 @@ export class OwnRenderer {
   async facts() {
     const scene = this.#gaussians.reduce((sum, { byteLength }) => sum + byteLength, 0);
     const splats = this.#gaussians.reduce((sum, { count }) => sum + count, 0);
-    const renderer = this.#renderer.byteLength;
+    const renderer = this.#viewpoint.byteLength;
     return {
       splats,
       shDegree: this.#gaussians[0]?.shDegree,
-      rasterizer: this.#renderer.rasterizer,
-      statistics: await this.#renderer.statistics(),
+      rasterizer: this.#viewpoint.rasterizer,
+      statistics: await this.#viewpoint.statistics(),
       bytes: { scene, renderer, perSplat: Number(((scene + renderer) / splats).toFixed(1)) },
       ignoredOptions: this.#unread(),
     };
   }
 
   close() {
-    this.#renderer.destroy();
+    this.#viewpoint.destroy();
     this.#timer?.destroy();
     this.#target.destroy();
   }
@@ -87,14 +89,14 @@ export class OwnRenderer {
   }
 
   async #hadRoom() {
-    const { overflow, pairOverflow } = await this.#renderer.statistics();
+    const { overflow, pairOverflow } = await this.#viewpoint.statistics();
     if (overflow + pairOverflow === 0) return true;
     // Asking makes room.
-    return this.#renderer.isComplete();
+    return this.#viewpoint.isComplete();
   }
 
   #drawInto(target, camera, timer) {
-    this.#renderer.render({ gaussians: this.#gaussians, camera, target, timer });
+    this.#viewpoint.draw(camera, { target, timer });
   }
 }
 

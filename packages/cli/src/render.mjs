@@ -3,7 +3,7 @@ import { basename, dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { cameraFromCalibration, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
@@ -132,10 +132,12 @@ async function render(options) {
   const validationErrors = [];
   device.addEventListener('uncapturederror', ({ error }) => validationErrors.push(error.message));
   const accumulation = chooseAccumulation(options.accumulation, device);
-  const renderer = new Renderer(device, { rasterizer: options.raster, accumulation });
+  const world = new World();
+  const viewpoint = new Viewpoint(device, world, { settings: { rasterizer: options.raster, accumulation } });
   const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased, filterVariance }));
-  const pixels = await capture(device, renderer, { gaussians, camera, background: options.background });
-  const statistics = await renderer.statistics();
+  world.add({ scene: gaussians });
+  const pixels = await capture(device, viewpoint, { camera, over: options.background });
+  const statistics = await viewpoint.statistics();
   if (validationErrors.length > 0) throw new Error(`WebGPU: ${validationErrors.join('\n')}`);
 
   if (options.out) writeWhole(resolve(from, options.out), encodePng(pixels, camera.width, camera.height));
@@ -144,7 +146,7 @@ async function render(options) {
   console.log(
     `${options.scene}: ${cloud.count} splats, SH degree ${cloud.shDegree}, ${antialiased ? 'antialiased' : 'classic'}; ` +
       `${cloud.droppedCount} unusable splats left out; ${statistics.visible} visible; ` +
-      `${width}x${height} by ${renderer.rasterizer} in ${accumulation} on ${adapter.info.description || adapter.info.vendor}`,
+      `${width}x${height} by ${viewpoint.rasterizer} in ${accumulation} on ${adapter.info.description || adapter.info.vendor}`,
   );
 }
 

@@ -1,11 +1,9 @@
 import { validateCamera, type Camera } from '@gaussian-splat/core';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
-import type { FrameRequest } from './frame-request.js';
 import type { FrameSettings, FrameTarget } from './frame-target.js';
-import type { Renderer } from './renderer.js';
 import { requireTextureSize } from './requirements.js';
 import { untilItHasRoom } from './until-it-has-room.js';
-import type { UncheckedViewpoint } from './viewpoint.js';
+import type { Viewpoint } from './viewpoint.js';
 
 /** Rows of a texture copy start at multiples of this many bytes. */
 const ROW_ALIGNMENT = 256;
@@ -18,16 +16,12 @@ export interface CaptureRequest extends Omit<FrameTarget, 'target'> {
 }
 
 /**
- * Draws one image and reads it back in float32, before any rounding to 8 bits. Drawn again where the renderer's buffers had no
+ * Draws one image and reads it back in float32, before any rounding to 8 bits. Drawn again where the viewpoint's buffers had no
  * room for all of it.
- * @throws GaussianSplatError as {@link UncheckedViewpoint.draw} does, before anything is allocated.
+ * @throws GaussianSplatError as {@link Viewpoint.draw} does, before anything is allocated.
  * @returns [height, width, 4] premultiplied red, green, blue and alpha, row by row from the top.
  */
-export async function capture(
-  device: GPUDevice,
-  viewpoint: UncheckedViewpoint,
-  request: CaptureRequest | Omit<FrameRequest, 'target' | 'targetFormat'>,
-): Promise<Float32Array> {
+export async function capture(device: GPUDevice, viewpoint: Viewpoint, request: CaptureRequest): Promise<Float32Array> {
   validateCamera(request.camera);
   requireTextureSize(device, request.camera);
   const { width, height } = request.camera;
@@ -45,8 +39,7 @@ export async function capture(
   });
   try {
     await untilItHasRoom(() => {
-      if ('gaussians' in request) (viewpoint as Renderer).render({ ...request, target: texture });
-      else viewpoint.draw(request.camera, { ...request, target: texture }, request.settings);
+      viewpoint.draw(request.camera, { ...request, target: texture }, request.settings);
       return viewpoint.isComplete();
     });
     const encoder = device.createCommandEncoder({ label: 'gs.capture' });

@@ -50,7 +50,7 @@ interface DynamicPage extends GaussianPage {
  * ```ts
  * const gaussians = await DynamicGaussians.create(device, gaussianLayout(header, contract));
  * gaussians.ingest({ gaussians: tensorBuffer }, rows); // after every run
- * renderer.render({ gaussians, camera, target: texture });
+ * viewpoint.draw(camera, { target: texture });
  * ```
  *
  * The tensors of a run are one copy of the Gaussians, the packed pages that are drawn the other. {@link ingest} goes from one to

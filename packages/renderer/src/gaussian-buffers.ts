@@ -15,7 +15,7 @@ export interface UploadOptions {
   readonly memoryBudget?: number;
 }
 
-/** Gaussians on the GPU, ready for any {@link Renderer} of the same device. */
+/** Gaussians on the GPU, ready for any {@link Viewpoint} of the same device. */
 export class GaussianBuffers implements GaussianScene {
   /** Splats of all levels of detail together. */
   readonly count: number;

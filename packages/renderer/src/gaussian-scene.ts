@@ -39,7 +39,7 @@ export interface PageRequests {
 }
 
 /**
- * What a {@link Renderer} draws: Gaussians on the GPU. `GaussianBuffers` holds those of a file, `DynamicGaussians` those that a
+ * What a {@link Viewpoint} draws: Gaussians on the GPU. `GaussianBuffers` holds those of a file, `DynamicGaussians` those that a
  * generator writes. Everything but the content of the buffers stays the same for as long as the scene lives.
  */
 export interface GaussianScene {

@@ -1,6 +1,4 @@
 export { capture, type CaptureRequest } from './capture.js';
-export { Viewpoint, type View } from './checked-viewpoint.js';
-export { createRenderer } from './choice/choose.js';
 export { autotune, startVariants, type AutotuneOptions, type StartOptions } from './choice/choose.js';
 export type { AutotuneStore } from './choice/kept-choice.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
@@ -26,11 +24,9 @@ export {
   type Target,
   type TargetView,
 } from './frame-target.js';
-export { Renderer } from './renderer.js';
 export { deviceDescriptor } from './requirements.js';
-export type { ViewpointOptions } from './viewpoint.js';
+export { Viewpoint, type View, type ViewpointOptions } from './viewpoint.js';
 export { Placement, World, type Box, type Placed } from './world.js';
-export type { FrameRequest, RendererOptions } from './frame-request.js';
 export { SceneDepth, type HostDepth, type SceneDepthOptions } from './scene-depth.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';

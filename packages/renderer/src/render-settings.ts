@@ -8,13 +8,13 @@ import type { Threads } from './stages/plan.js';
 export interface RenderSettings {
   /**
    * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
-   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link createRenderer}.
+   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link autotune}.
    */
   readonly rasterizer: 'auto' | RasterizerName;
-  /** How stages share their work; the image is the same. `auto`: see {@link createRenderer}. */
+  /** How stages share their work; the image is the same. `auto`: see {@link autotune}. */
   readonly threads: 'auto' | Threads;
   /**
-   * Precision in which quads are blended and images kept. `auto`: see {@link createRenderer}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
+   * Precision in which quads are blended and images kept. `auto`: see {@link autotune}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
    * feature `float32-blendable`.
    */
   readonly accumulation: 'auto' | AccumulationFormat;

@@ -97,23 +97,11 @@ export function requireFrameTarget({ target, over, colours }: Partial<FrameTarge
     throw missing('over', "'target', or four finite numbers: premultiplied red, green, blue and alpha", over);
 }
 
-/** @throws GaussianSplatError `argument/value` */
-export function requireScenes(gaussians: unknown, levers: unknown): void {
-  const scenes = Array.isArray(gaussians) ? (gaussians as readonly unknown[]) : [gaussians];
-  if (!scenes.every(isObject)) throw missing('gaussians', 'a scene, or a list of scenes', gaussians);
-  if (levers !== undefined && !isObject(levers))
-    throw missing('settings', 'an object of settings, or undefined', levers);
-}
-
 const formatOf = (target: GPUTexture | { readonly format: GPUTextureFormat }): string => target.format;
 
 const isObject = (value: unknown): value is object => typeof value === 'object' && value !== null;
 
-function missing(
-  name: keyof FrameTarget | 'settings' | 'gaussians',
-  expected: string,
-  found: unknown,
-): GaussianSplatError {
+function missing(name: keyof FrameTarget | 'settings', expected: string, found: unknown): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
     where: name === 'settings' ? 'FrameSettings' : `FrameTarget.${name}`,
     expected,

@@ -46,7 +46,6 @@ export { packLevelRuns } from './streaming/pack-runs.js';
 export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
 export { readPacked } from './pack/packed-scene.js';
-export { UncheckedViewpoint } from './viewpoint.js';
 export { boundsOfWorld } from './world-bounds.js';
 export { type Threads } from './stages/plan.js';
 export { bytesPerSplat, type Reservation } from './memory-ledger.js';

@@ -11,7 +11,7 @@ import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { orderOn } from './lazy-order.js';
-import { completed, type RenderSettings } from './render-settings.js';
+import type { RenderSettings } from './render-settings.js';
 import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
 import { OverdrawLimit } from './overdraw.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
@@ -28,11 +28,18 @@ import { requireBlendable, requireTextureSize } from './requirements.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import type { FrameCounts } from './capacity.js';
+import { checkArguments, checkFrame, settingsOf } from './checks.js';
 import { copyCounts } from './copy-counts.js';
 import type { FrameStatistics } from './statistics.js';
 import { settle, variantsOf, type Variants } from './variants.js';
 import { scaled } from './view.js';
 import type { World } from './world.js';
+
+/** One of several views: see {@link Viewpoint.drawAll}. */
+export interface View {
+  readonly camera: Camera;
+  readonly picture: FrameTarget;
+}
 
 /** What an image size needs where the rasterizer cannot write the target. */
 interface Accumulation {
@@ -50,7 +57,7 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
 /** Of a target: a view of more than that is none to draw into. */
 const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
 
-/** Options of a {@link UncheckedViewpoint}. */
+/** Options of a {@link Viewpoint}. */
 export interface ViewpointOptions {
   /** Settings of frames that are given none. They decide what is allocated. */
   readonly settings?: FrameSettings;
@@ -66,7 +73,7 @@ export interface ViewpointOptions {
 }
 
 /** A frame that has been encoded. */
-export interface Encoded {
+interface Encoded {
   /** The encoder to go on with. */
   readonly last: GPUCommandEncoder;
   /** Its counts are to be read. */
@@ -86,13 +93,19 @@ interface Engine {
 }
 
 /**
- * A viewpoint that takes its callers at their word: of what it is given, only the camera is checked. For callers that make all of it themselves, such as the
- * element, whose pages then do not fetch the checks. All others use `Viewpoint`, which has them.
+ * Draws a world, on your own device.
+ *
+ * ```ts
+ * const world = new World();
+ * world.add({ scene: await GaussianBuffers.upload(device, packGaussians(cloud)) });
+ * const viewpoint = new Viewpoint(device, world);
+ * viewpoint.draw(camera, { target: texture });
+ * ```
  *
  * Memory is allocated when scenes come, and when the image size or the share of visible splats changes, never while only the camera or a scene moves; no frame
  * waits for a read-back. Each frame sorts the splats that it shows.
  */
-export class UncheckedViewpoint {
+export class Viewpoint {
   readonly world: World;
   readonly #device: GPUDevice;
   /** Of settings that have been met. */
@@ -111,7 +124,7 @@ export class UncheckedViewpoint {
   #engine: Engine;
   /** By size, the one used last at the end. */
   readonly #accumulations = new Map<string, Accumulation>();
-  protected mostSizes = 1;
+  #mostSizes = 1;
   /** Of the last frame with auxiliary outputs. */
   #auxiliary: AuxiliaryTilePainter | undefined;
   /** Whether the last frame had to do without the code for its order. */
@@ -136,7 +149,7 @@ export class UncheckedViewpoint {
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
-    this.#engine = this.#makeEngine(this.resolve(settings));
+    this.#engine = this.#makeEngine(this.#resolve(settings));
   }
 
   /** Settings of frames that are given none. */
@@ -148,14 +161,14 @@ export class UncheckedViewpoint {
     if (settings === this.#settings) return;
     this.#variants = variantsOf(this.#device);
     this.#known = new WeakMap();
-    const levers = this.resolve(settings);
+    const levers = this.#resolve(settings);
     this.#settings = settings;
     this.#useEngine(levers);
   }
 
   /** The settings that {@link settings} come to on this device; nothing is left `auto`. */
   get resolvedSettings(): RenderSettings & Variants {
-    return this.resolve(this.#settings);
+    return this.#resolve(this.#settings);
   }
 
   /** Name of the rasterizer in use. */
@@ -187,7 +200,7 @@ export class UncheckedViewpoint {
    */
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
     const { rasterizer } = this.#engine;
-    const all = settings.map((each) => this.resolve(each));
+    const all = settings.map((each) => this.#resolve(each));
     for (const levers of all) {
       const order = levers.order === 'pixel' ? orderOn(this.#device).now : undefined;
       rasterizer.prepare(levers, targetFormat, order?.painter(levers));
@@ -204,7 +217,7 @@ export class UncheckedViewpoint {
   draw(camera: Camera, picture: FrameTarget, settings: FrameSettings = this.#settings): void {
     const { timer } = picture;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const encoded = this.encode(encoder, camera, picture, settings, true);
+    const encoded = this.#encode(encoder, camera, picture, settings, true);
     const { last, isWatched, submissions, wishes, resources } = encoded;
     timer?.endFrame?.(last);
     for (const wish of wishes) wish.copy(last);
@@ -221,8 +234,28 @@ export class UncheckedViewpoint {
     for (const wish of wishes) wish.read();
   }
 
+  /**
+   * Draws several views of the world, such as both eyes or thumbnails: sizes that come again keep their buffers.
+   * @throws GaussianSplatError as {@link draw} does.
+   */
+  drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
+    this.#mostSizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`)).size || 1;
+    for (const { camera, picture } of views) this.draw(camera, picture, settings);
+  }
+
+  /**
+   * Records one frame into a host's encoder, between its passes, and submits nothing. The host submits within the same task: what the viewpoint learns of a frame
+   * (how much room it needs, which pages it asks for) it reads in the next one. Record a viewpoint once for each submission: its uniforms are those of
+   * the last frame that was recorded. `submissions` of the settings, and `timer` of the frame, are the host's.
+   * @throws GaussianSplatError as {@link draw} does.
+   */
+  record(encoder: GPUCommandEncoder, camera: Camera, picture: FrameTarget, settings = this.#settings): void {
+    const encoded = this.#encode(encoder, camera, { ...picture, timer: undefined }, settings, false);
+    if (encoded.isWatched || encoded.wishes.length > 0) setTimeout(() => this.#readLater(encoded));
+  }
+
   /** Records a frame. @param mayDivide whether it may be handed over in parts */
-  protected encode(
+  #encode(
     encoder: GPUCommandEncoder,
     camera: Camera,
     picture: FrameTarget,
@@ -232,9 +265,10 @@ export class UncheckedViewpoint {
     const { auxiliary, timer, depth } = picture;
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
-    this.check?.(camera, picture, settings);
+    checkArguments(picture, settings);
+    const asked = this.#resolve(settings);
+    checkFrame(camera, picture, asked);
     const target = this.#targetOf(picture, camera);
-    const asked = this.resolve(settings);
     const order = this.#orderOf(asked);
     this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
@@ -291,7 +325,7 @@ export class UncheckedViewpoint {
   }
 
   /** Reads what a frame left that a host has submitted. */
-  protected readLater({ resources, isWatched, wishes }: Encoded): void {
+  #readLater({ resources, isWatched, wishes }: Encoded): void {
     if (this.#engine.resources.current !== resources) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
     for (const wish of wishes) wish.copy(encoder);
@@ -444,19 +478,11 @@ export class UncheckedViewpoint {
     return current;
   }
 
-  /** Throws for a frame that cannot be drawn; absent where callers know what they do. */
-  protected check?(camera: Camera, picture: FrameTarget, settings: FrameSettings): void;
-
-  /** Settings with those that are not given. */
-  protected complete(settings: FrameSettings): RenderSettings {
-    return completed(settings);
-  }
-
   /** The settings that these come to on this device; nothing is left `auto`. */
-  protected resolve(settings: FrameSettings): RenderSettings & Variants {
+  #resolve(settings: FrameSettings): RenderSettings & Variants {
     const known = this.#known.get(settings);
     if (known) return known;
-    const made = settle(this.#variants, this.complete(settings));
+    const made = settle(this.#variants, settingsOf(settings));
     this.#known.set(settings, made);
     return made;
   }
@@ -518,7 +544,7 @@ export class UncheckedViewpoint {
       return known;
     }
     for (const old of this.#accumulations.keys()) {
-      if (this.#accumulations.size < this.mostSizes) break;
+      if (this.#accumulations.size < this.#mostSizes) break;
       this.#accumulations.get(old)!.texture.destroy();
       this.#accumulations.delete(old);
     }

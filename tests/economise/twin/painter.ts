@@ -1,6 +1,7 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import type { Image } from '@gaussian-splat/economise';
-import { capture, GaussianBuffers, packGaussians, Renderer, type Quality } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type Quality } from '@gaussian-splat/renderer';
+import { capture, Renderer } from '../../support/renderer.js';
 
 /** Draws clouds. */
 export interface Painter {

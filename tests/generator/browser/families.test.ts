@@ -1,6 +1,6 @@
 /** One small file of every family that the exporter writes (packages/exporter/tests/write_zoo.py): the GPU against the CPU, in numbers and in pictures. */
 import { numberToHalf } from '@gaussian-splat/core';
-import { capture, DynamicGaussians, ImageTensor, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians, ImageTensor } from '@gaussian-splat/renderer';
 import {
   Generator,
   openModel,
@@ -12,6 +12,7 @@ import {
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import { isLab } from '../../support/extent-in-pages.js';
 import { calls, CAMERA, makeDevice, numbersOf, readBuffer, ReadingSink, relativeError, runOnCpu } from './support.js';
+import { capture, Renderer } from '../../support/renderer.js';
 
 const FAMILIES = '/tests/fixtures/families/';
 const RELATIVE_ERROR = 1e-3;

@@ -1,7 +1,7 @@
 /** Instances of one generator: one run for all that ask in a frame, each with its own pose, and each untouched by the others' faults. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { Generator, type GaussianSink, type GeneratorState } from '@gaussian-splat/generator';
 import { assert, assertEqual, delay, nextEvent, showLoaded, until } from '../../element/browser/support/harness.js';
 import { itInLab } from '../../support/extent-in-pages.js';
@@ -16,6 +16,7 @@ import {
   relativeError,
   RUNTIME,
 } from './support.js';
+import { capture, Renderer } from '../../support/renderer.js';
 
 const FAMILIES = '/tests/fixtures/families/';
 const ROWS = 80;

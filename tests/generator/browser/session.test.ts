@@ -1,5 +1,5 @@
 /** Generators on the GPU of a real browser: true numbers, nothing needless on the frame path, faults that leave the page alive. */
-import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
+import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { Generator, isRuntimeRequested, type GeneratorOptions, type ModelSource } from '@gaussian-splat/generator';
 import { assert, assertEqual, delay } from '../../element/browser/support/harness.js';
 import { itInLab, someOf } from '../../support/extent-in-pages.js';
@@ -14,6 +14,7 @@ import {
   relativeError,
   runOnCpu,
 } from './support.js';
+import { capture, Renderer } from '../../support/renderer.js';
 
 let device: GPUDevice;
 const opened: Generator[] = [];

@@ -1,18 +1,11 @@
 /** Drawing for the rows: a scene with either rasterizer, as a still camera or a turning one sees it. */
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import {
-  capture,
-  GaussianBuffers,
-  packGaussians,
-  Renderer,
-  type PackOptions,
-  type RasterizerName,
-  type RendererOptions,
-} from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, type PackOptions, type RasterizerName } from '@gaussian-splat/renderer';
 import type { Threads } from '@gaussian-splat/renderer/tools';
 import { renderOracle, type Mode, type OracleImage } from '../../oracle/oracle.js';
 import { closeness, type Closeness } from '../../support/compare.js';
 import { sized } from './row.js';
+import { capture, Renderer, type RendererOptions } from '../../support/renderer.js';
 
 export const RASTERIZERS: readonly RasterizerName[] = ['quads', 'tiles'];
 

@@ -1,5 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { Renderer } from '@gaussian-splat/renderer';
+import type { Viewpoint } from '@gaussian-splat/renderer';
 import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
 import { readBack } from '@gaussian-splat/renderer/tools';
 import type { SeenSplats } from '../pages/seen-splats.js';
@@ -17,6 +17,7 @@ import { PictureErrors } from './picture-errors.js';
 import { putLowered } from './put-lowered.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
+import { exactViewpoint } from './show.js';
 import { seenIn } from './seen-splats.js';
 
 export interface GpuEvaluatorOptions {
@@ -30,8 +31,6 @@ export interface GpuEvaluatorOptions {
   readonly onScored?: (views: number, all: number) => void;
 }
 
-/** Exact, so that no rounding is taken for an effect of the cut. */
-const QUALITY = { quality: 'reference' } as const;
 /** Shaders whose pipelines are made once for a device. */
 const STAGES = [
   ...[shaders.economiseScore, shaders.economiseMoments, shaders.economiseLower, shaders.economiseCut],
@@ -50,7 +49,7 @@ export class GpuEvaluator implements Evaluator {
   readonly #cloud: GaussianCloud;
   readonly #views: DealtViews;
   readonly #scene: SceneParts;
-  readonly #renderer: Renderer;
+  readonly #viewpoint: Viewpoint;
   readonly #cutScene: CutScene;
   readonly #pool: TaskPool;
   readonly #onScored: GpuEvaluatorOptions['onScored'];
@@ -75,13 +74,13 @@ export class GpuEvaluator implements Evaluator {
     this.#cutScene = cutScene;
     this.#pool = pool;
     this.#onScored = onScored;
-    this.#renderer = new Renderer(device, QUALITY);
+    this.#viewpoint = exactViewpoint(device);
   }
 
   /** Makes pipelines that {@link create} and what follows would make, for those who wait for a cloud meanwhile. */
   static prepare(device: GPUDevice): void {
     for (const stage of STAGES) rareKernelOf(device, stage).prepare();
-    new Renderer(device, QUALITY).destroy();
+    exactViewpoint(device).destroy();
   }
 
   /**
@@ -108,7 +107,7 @@ export class GpuEvaluator implements Evaluator {
   async rank(signal?: AbortSignal): Promise<Ranking> {
     signal?.throwIfAborted();
     if (this.#ranking) return this.#ranking;
-    const scorer = new SceneScorer(this.#device, this.#renderer, this.#scene, this.#views.scored);
+    const scorer = new SceneScorer(this.#device, this.#viewpoint, this.#scene, this.#views.scored);
     try {
       await scorer.run(signal, this.#onScored);
       const parts = this.#scene.parts.map(({ scores, page }) => ({
@@ -117,7 +116,7 @@ export class GpuEvaluator implements Evaluator {
       }));
       this.#ranking = this.#rankingOf(await readBack(this.#device, parts));
       this.#order = this.#orderAhead(this.#ranking);
-      // Now, while the renderer still has room for this scene: for each other one it finds it anew.
+      // Now, while the viewpoint still has room for this scene: for each other one it finds it anew.
       for (const views of ['searched', 'heldOut'] as const) await this.#errorsIn(views);
       return this.#ranking;
     } finally {
@@ -203,7 +202,7 @@ export class GpuEvaluator implements Evaluator {
 
   destroy(): void {
     for (const errors of this.#errors.values()) errors.destroy();
-    this.#renderer.destroy();
+    this.#viewpoint.destroy();
     this.#cutScene.destroy();
     this.#scene.destroy();
   }
@@ -211,7 +210,7 @@ export class GpuEvaluator implements Evaluator {
   async #errorsIn(views: JudgedViews): Promise<PictureErrors> {
     const known = this.#errors.get(views);
     if (known) return known;
-    const made = await PictureErrors.of(this.#device, this.#renderer, this.#scene.gaussians, this.#views[views]);
+    const made = await PictureErrors.of(this.#device, this.#viewpoint, this.#scene.gaussians, this.#views[views]);
     this.#errors.set(views, made);
     return made;
   }

@@ -1,8 +1,9 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { GaussianScene, Renderer } from '@gaussian-splat/renderer';
+import type { GaussianScene, Viewpoint } from '@gaussian-splat/renderer';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, TEXTURE_USAGE, writeStruct } from '@gaussian-splat/renderer/stages';
 import { untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
 import * as generated from '../generated/shaders.js';
+import { show } from './show.js';
 
 const { ERROR_TILE, pictureError, pictureErrorSum, PictureErrors: layout } = generated;
 /** A sum of squares and a count of pixels. */
@@ -29,7 +30,7 @@ export interface Exhibit {
  */
 export class PictureErrors {
   readonly #device: GPUDevice;
-  readonly #renderer: Renderer;
+  readonly #viewpoint: Viewpoint;
   readonly #memory: GpuMemory;
   /** Pictures at hand, by their size. */
   readonly #targets = new Map<string, GPUTexture>();
@@ -39,9 +40,9 @@ export class PictureErrors {
   readonly #counts: GPUBuffer;
   readonly #sum: GPUBindGroup;
 
-  private constructor(device: GPUDevice, renderer: Renderer, views: readonly Camera[]) {
+  private constructor(device: GPUDevice, viewpoint: Viewpoint, views: readonly Camera[]) {
     this.#device = device;
-    this.#renderer = renderer;
+    this.#viewpoint = viewpoint;
     this.#memory = new GpuMemory(device);
     const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
     const buffer = (name: string, bytes: number, usage: number): GPUBuffer =>
@@ -67,12 +68,12 @@ export class PictureErrors {
    */
   static async of(
     device: GPUDevice,
-    renderer: Renderer,
+    viewpoint: Viewpoint,
     gaussians: GaussianScene,
     views: readonly Camera[],
     pause?: Pause,
   ): Promise<PictureErrors> {
-    const made = new PictureErrors(device, renderer, views);
+    const made = new PictureErrors(device, viewpoint, views);
     try {
       const sums = new Float32Array(await made.#draw(gaussians, ({ reference }) => reference, pause));
       made.#covered = views.map((_, k) => sums[2 * k + 1]);
@@ -141,9 +142,10 @@ export class PictureErrors {
     pause: Pause | undefined,
   ): Promise<ArrayBuffer> {
     let sums = new ArrayBuffer(0);
+    show(this.#viewpoint, gaussians);
     await untilItHasRoom(async () => {
       for (const [k, exhibit] of this.#exhibits.entries()) {
-        this.#renderer.render({ gaussians, camera: exhibit.camera, target: targetOf(exhibit) });
+        this.#viewpoint.draw(exhibit.camera, { target: targetOf(exhibit) });
         this.#compare(exhibit, k);
         await pause?.();
       }
@@ -152,7 +154,7 @@ export class PictureErrors {
       sums = found;
       // Each call remembers the room that its view lacked.
       const hadRoom = this.#exhibits.map((_, k) =>
-        this.#renderer.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)),
+        this.#viewpoint.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)),
       );
       return !hadRoom.includes(false);
     });
@@ -161,7 +163,7 @@ export class PictureErrors {
 
   #compare({ columns, rows, compare }: Exhibit, k: number): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.compare' });
-    this.#renderer.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
+    this.#viewpoint.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
     const pass = encoder.beginComputePass({ label: 'gs.economise.compare' });
     rareKernelOf(this.#device, pictureError).dispatchGrid(pass, compare, columns, rows);
     pass.end();

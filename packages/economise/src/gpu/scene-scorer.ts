@@ -1,5 +1,5 @@
 import { eyeOf, type Camera } from '@gaussian-splat/core';
-import type { Renderer } from '@gaussian-splat/renderer';
+import type { Viewpoint } from '@gaussian-splat/renderer';
 import {
   BUFFER_USAGE,
   cameraValues,
@@ -16,6 +16,7 @@ import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '.
 import { MIN_LOOKS, PRIOR_VIEWS, UNSEEN_CONTRAST } from '../score.js';
 import { layouts, NO_VIEW } from './layouts.js';
 import type { SceneParts } from './scene-parts.js';
+import { show } from './show.js';
 
 /**
  * Squared difference of a splat's colour to what lies behind it, a channel: an assumption, on the low side of the means of captured scenes (0.05 to 0.16). It shifts
@@ -34,7 +35,7 @@ const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
  */
 export class SceneScorer {
   readonly #device: GPUDevice;
-  readonly #renderer: Renderer;
+  readonly #viewpoint: Viewpoint;
   readonly #scene: SceneParts;
   readonly #views: readonly Camera[];
   readonly #memory: GpuMemory;
@@ -45,10 +46,10 @@ export class SceneScorer {
   readonly #eyes: GPUBuffer;
   readonly #targets = new Map<string, GPUTexture>();
 
-  /** @param renderer one with the rasterizer `tiles` */
-  constructor(device: GPUDevice, renderer: Renderer, scene: SceneParts, views: readonly Camera[]) {
+  /** @param viewpoint one with the rasterizer `tiles` */
+  constructor(device: GPUDevice, viewpoint: Viewpoint, scene: SceneParts, views: readonly Camera[]) {
     this.#device = device;
-    this.#renderer = renderer;
+    this.#viewpoint = viewpoint;
     this.#scene = scene;
     this.#views = views;
     this.#memory = new GpuMemory(device);
@@ -75,7 +76,7 @@ export class SceneScorer {
   }
 
   /**
-   * Draws a few views, waiting for each. The renderer finds the room that the others will need, and that their painting need not be divided into many submissions, which takes the CPU longer than it takes the
+   * Draws a few views, waiting for each. The viewpoint finds the room that the others will need, and that their painting need not be divided into many submissions, which takes the CPU longer than it takes the
    * GPU to draw.
    */
   async #rehearse(signal: AbortSignal | undefined): Promise<void> {
@@ -85,10 +86,10 @@ export class SceneScorer {
         signal?.throwIfAborted();
         this.#paint(camera);
         const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.rehearse' });
-        this.#renderer.copyCounts(encoder, this.#counts, 0);
+        this.#viewpoint.copyCounts(encoder, this.#counts, 0);
         this.#device.queue.submit([encoder.finish()]);
         const [counts] = await readBack(this.#device, [{ buffer: this.#counts, byteLength: COUNTS_BYTES }]);
-        return this.#renderer.hadRoom(new Uint32Array(counts));
+        return this.#viewpoint.hadRoom(new Uint32Array(counts));
       });
     }
   }
@@ -97,7 +98,8 @@ export class SceneScorer {
   #paint(camera: Camera): void {
     const target = this.#targetOf(camera);
     const auxiliary = new AuxiliaryOutputs({ contributions: this.#peaks });
-    this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, auxiliary });
+    show(this.#viewpoint, this.#scene.gaussians);
+    this.#viewpoint.draw(camera, { target, auxiliary });
   }
 
   /** @returns whether there was room for all that each view should show; if not, there will be */
@@ -117,14 +119,14 @@ export class SceneScorer {
       const isLast = k === this.#views.length - 1;
       if (!isLast && (k + 1) % this.#scene.views !== 0) continue;
       this.#gather(k - (k % this.#scene.views), k + 1);
-      // The renderer's own looks at what a frame took come back meanwhile.
+      // The viewpoint's own looks at what a frame took come back meanwhile.
       await this.#device.queue.onSubmittedWorkDone();
       onScored?.(k + 1, this.#views.length);
     }
     const [counts] = await readBack(this.#device, [{ buffer: this.#counts }]);
     this.#memory.free(uniforms);
     signal?.throwIfAborted();
-    const hadRoom = this.#views.map((_, k) => this.#renderer.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)));
+    const hadRoom = this.#views.map((_, k) => this.#viewpoint.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)));
     return !hadRoom.includes(false);
   }
 
@@ -153,7 +155,7 @@ export class SceneScorer {
   #note(uniforms: GPUBuffer, k: number): void {
     const kernel = rareKernelOf(this.#device, economiseScore);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.score' });
-    this.#renderer.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
+    this.#viewpoint.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
     const pass = encoder.beginComputePass({ label: 'gs.economise.score' });
     this.#scene.parts.forEach(({ page, first, row, scores, energies }, p) => {
       const offset = VIEW_STRIDE * (this.#scene.parts.length * k + p);

@@ -1,9 +1,10 @@
 import { GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { Renderer } from '@gaussian-splat/renderer';
+import type { Viewpoint } from '@gaussian-splat/renderer';
 import type { SeenSplats } from '../pages/seen-splats.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
 import { PictureErrors } from '../gpu/picture-errors.js';
+import { exactViewpoint } from '../gpu/show.js';
 import { mean } from '../measure.js';
 import type { Cut, ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
@@ -30,7 +31,7 @@ export class RefiningEvaluator implements Evaluator {
   readonly #inner: Evaluator;
   readonly #cloud: GaussianCloud;
   readonly #options: RefiningOptions;
-  readonly #renderer: Renderer;
+  readonly #viewpoint: Viewpoint;
   #pictures: Promise<PictureErrors> | undefined;
 
   /**
@@ -43,7 +44,7 @@ export class RefiningEvaluator implements Evaluator {
     this.#inner = inner;
     this.#cloud = cloud;
     this.#options = options;
-    this.#renderer = new Renderer(options.device, { quality: 'reference' });
+    this.#viewpoint = exactViewpoint(options.device);
   }
 
   get mergePrices(): readonly number[] | undefined {
@@ -82,7 +83,7 @@ export class RefiningEvaluator implements Evaluator {
     if (pictures.covered.every((pixels) => pixels === 0)) return reduced;
     const scene = await RefinedScene.of(device, reduced);
     try {
-      const fitter = new SceneFitter(device, this.#renderer, scene, pictures);
+      const fitter = new SceneFitter(device, this.#viewpoint, scene, pictures);
       try {
         const before = await fitter.fit({ ...USUAL_DESCENT, ...descent }, signal);
         // Few steps, or steps that are too large, may lead away.
@@ -98,7 +99,7 @@ export class RefiningEvaluator implements Evaluator {
 
   destroy(): void {
     this.#inner.destroy();
-    this.#renderer.destroy();
+    this.#viewpoint.destroy();
     void this.#pictures?.then(
       (pictures) => pictures.destroy(),
       () => undefined,
@@ -109,7 +110,7 @@ export class RefiningEvaluator implements Evaluator {
     const { device, views } = this.#options;
     const whole = await CloudBuffers.upload(device, this.#cloud);
     try {
-      return await PictureErrors.of(device, this.#renderer, whole, views);
+      return await PictureErrors.of(device, this.#viewpoint, whole, views);
     } finally {
       whole.destroy();
     }

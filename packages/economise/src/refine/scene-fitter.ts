@@ -1,5 +1,5 @@
 import { shCoefficientCount } from '@gaussian-splat/core';
-import type { Renderer } from '@gaussian-splat/renderer';
+import type { Viewpoint } from '@gaussian-splat/renderer';
 import {
   BUFFER_USAGE,
   cameraValues,
@@ -20,6 +20,7 @@ import {
 } from '../generated/shaders.js';
 import { layouts, NO_VIEW } from '../gpu/layouts.js';
 import type { PictureErrors } from '../gpu/picture-errors.js';
+import { show } from '../gpu/show.js';
 import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';
 
@@ -75,7 +76,7 @@ export const USUAL_DESCENT: Descent = {
 /** Fits the splats of a scene to pictures by gradient descent. */
 export class SceneFitter {
   readonly #device: GPUDevice;
-  readonly #renderer: Renderer;
+  readonly #viewpoint: Viewpoint;
   readonly #scene: RefinedScene;
   readonly #errors: PictureErrors;
   readonly #memory: GpuMemory;
@@ -84,9 +85,9 @@ export class SceneFitter {
   readonly #steps: readonly GPUBuffer[];
 
   /** @param errors the pictures to come near to */
-  constructor(device: GPUDevice, renderer: Renderer, scene: RefinedScene, errors: PictureErrors) {
+  constructor(device: GPUDevice, viewpoint: Viewpoint, scene: RefinedScene, errors: PictureErrors) {
     this.#device = device;
-    this.#renderer = renderer;
+    this.#viewpoint = viewpoint;
     this.#scene = scene;
     this.#errors = errors;
     this.#memory = new GpuMemory(device);
@@ -100,7 +101,7 @@ export class SceneFitter {
   /** Goes down, for so many steps. @returns [views] errors before */
   async fit(descent: Descent, signal?: AbortSignal): Promise<readonly number[]> {
     const { steps, viewsAtOnce, lastRate } = descent;
-    // Draws all views until the renderer has room for the scene: what lacks splats has wrong derivatives.
+    // Draws all views until the viewpoint has room for the scene: what lacks splats has wrong derivatives.
     const before = await this.#errors.measure(this.#scene);
     const pace = Math.min(1, Math.sqrt(mean(before) / USUAL_ERROR));
     const order = viewOrder(this.#errors.exhibits.length);
@@ -122,8 +123,9 @@ export class SceneFitter {
   look(view: number): void {
     const { camera, reference } = this.#errors.exhibits[view];
     const image = this.#errors.targetOf(camera);
-    this.#renderer.render({ gaussians: this.#scene, camera, target: image, auxiliary: AUXILIARY });
-    const noted = this.#renderer.auxiliary;
+    show(this.#viewpoint, this.#scene);
+    this.#viewpoint.draw(camera, { target: image, auxiliary: AUXILIARY });
+    const noted = this.#viewpoint.auxiliary;
     if (noted === undefined) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.look' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.look' });

@@ -1,14 +1,14 @@
 /** Loaded only when a page asks what its splats contribute. */
 import type { Camera, SplatFilter } from '@gaussian-splat/core';
-import type { FrameSettings, World } from '@gaussian-splat/renderer';
-import { AuxiliaryOutputs, readBackWith, UncheckedViewpoint, untilItHasRoom } from '@gaussian-splat/renderer/tools';
+import { Viewpoint, type FrameSettings, type World } from '@gaussian-splat/renderer';
+import { AuxiliaryOutputs, readBackWith, untilItHasRoom } from '@gaussian-splat/renderer/tools';
 import type { ReadCounts } from './painter.js';
 
 /** What is counted of: a viewport. */
 export interface Counted {
   readonly device: GPUDevice;
   readonly isDestroyed: boolean;
-  readonly viewpoint: Pick<UncheckedViewpoint, 'statistics'>;
+  readonly viewpoint: Pick<Viewpoint, 'statistics'>;
   readonly view: { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined };
 }
 
@@ -40,7 +40,7 @@ async function countContributing({ device, view }: Counted, camera: Camera): Pro
         .flatMap(({ scene, visible }) => (visible ? scene.pages : []))
         .reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
     );
-  const viewpoint = new UncheckedViewpoint(device, world, {
+  const viewpoint = new Viewpoint(device, world, {
     settings: { ...settings, rasterizer: 'tiles', order: 'center' },
   });
   const contributions = device.createBuffer({ label: 'gs.contributions', size, usage: STORAGE | COPY_SRC });

@@ -1,12 +1,6 @@
 import { loadModule, type Camera } from '@gaussian-splat/core';
-import type { FrameSettings, PerFrameSettings } from '@gaussian-splat/renderer';
-import {
-  QueueClock,
-  UncheckedViewpoint,
-  type ProbeAnswer,
-  type ProbePoint,
-  type WorkTime,
-} from '@gaussian-splat/renderer/tools';
+import { Viewpoint, type FrameSettings, type PerFrameSettings } from '@gaussian-splat/renderer';
+import { QueueClock, type ProbeAnswer, type ProbePoint, type WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type {
   CanvasFrame,
@@ -24,7 +18,7 @@ import { why } from './request-device.js';
 
 /** Draws frames on one WebGPU device: a viewpoint, whose buffers fit the frame's size, and what stands between it and the canvas. */
 export class Viewport implements Painter {
-  readonly viewpoint: UncheckedViewpoint;
+  readonly viewpoint: Viewpoint;
   readonly device: GPUDevice;
   readonly place: Place;
   readonly #submissions: number;
@@ -45,7 +39,7 @@ export class Viewport implements Painter {
     this.#submissions = submissions;
     this.#contents = contents;
     this.#events = events;
-    this.viewpoint = new UncheckedViewpoint(device, contents.world, {
+    this.viewpoint = new Viewpoint(device, contents.world, {
       settings: this.#settings(),
       limitsOverdraw: true,
       onIncomplete: () => {

@@ -3,18 +3,6 @@ import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
 import { keyFor, pageStore, readChoice, writeChoice, type AutotuneStore } from './kept-choice.js';
 import type * as trials from './trials.js';
-import type { RendererOptions } from '../frame-request.js';
-import { Renderer } from '../renderer.js';
-
-/**
- * A renderer whose `auto` settings have been decided on this device: variants that give a wrong image are ruled out by a self-test, the
- * others are timed (see {@link autotune}). The constructor decides by what has been chosen on the device before, or else takes
- * `quads`, `rgba16float` and `parallel`, which work everywhere.
- */
-export async function createRenderer(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
-  await autotune(device);
-  return new Renderer(device, options);
-}
 
 export interface AutotuneOptions {
   /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
@@ -69,7 +57,8 @@ async function start(device: GPUDevice, options: StartOptions, choice: Choice): 
 
 /**
  * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a self-test are out, the
- * others are timed on small scenes. Takes about a second the first time on an adapter, most of it to compile what is not chosen in the end; then the choice is kept in `store`, and
+ * others are timed on small scenes. Viewpoints made after that draw their `auto` settings with them; before, with what was chosen on the device on an earlier visit, or else `quads`,
+ * `rgba16float` and `parallel`, which work everywhere. Takes about a second the first time on an adapter, most of it to compile what is not chosen in the end; then the choice is kept in `store`, and
  * only its answer is checked again. What it took is in the performance timeline, as `gaussian-splat.search`; of that, `detail.paused` milliseconds were pauses.
  * @throws GaussianSplatError `unsupported/wrong-image` if no variant passes the self-test.
  */

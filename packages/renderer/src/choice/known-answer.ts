@@ -5,7 +5,7 @@ import { constants } from '../generated/shaders.js';
 import { packKept, type PackedGaussians } from '../pack/pack.js';
 import type { GaussianScene } from '../gaussian-scene.js';
 import type { FrameSettings } from '../frame-target.js';
-import { UncheckedViewpoint } from '../viewpoint.js';
+import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import { sumsAndSorts } from './stages-alone.js';
 import type { ShPrecision } from '../pack/words.js';
@@ -65,14 +65,10 @@ function isNear(pixels: Float32Array, expected: Float64Array): boolean {
 }
 
 /** A viewpoint of these scenes alone. */
-export function viewpointOf(
-  device: GPUDevice,
-  scenes: readonly GaussianScene[],
-  settings: FrameSettings,
-): UncheckedViewpoint {
+export function viewpointOf(device: GPUDevice, scenes: readonly GaussianScene[], settings: FrameSettings): Viewpoint {
   const world = new World();
   for (const scene of scenes) world.add({ scene });
-  return new UncheckedViewpoint(device, world, { settings });
+  return new Viewpoint(device, world, { settings });
 }
 
 /** A camera that looks at the spheres askew, so that a transposed matrix shows. */

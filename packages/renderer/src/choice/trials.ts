@@ -2,7 +2,7 @@
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { QueueClock } from '../gpu/queue-clock.js';
-import { UncheckedViewpoint } from '../viewpoint.js';
+import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { faultsOf, type Variants } from '../variants.js';
@@ -33,7 +33,7 @@ export const isRight = (device: GPUDevice, variants: Variants, format?: GPUTextu
 
 /** Asks for the pipelines of a first picture. */
 function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat): void {
-  const renderer = new UncheckedViewpoint(device, new World(), { settings: variants });
+  const renderer = new Viewpoint(device, new World(), { settings: variants });
   renderer.prepare([{}], format);
   renderer.destroy();
 }

@@ -23,7 +23,7 @@ const MAX_BINDINGS = 8;
  *
  * ```ts
  * const frame = new FilteredFrame(device, width, height);
- * renderer.render({ gaussians, camera, target: frame.drawn });
+ * viewpoint.draw(camera, { target: frame.drawn });
  * const tensor = frame.handOver({ width: 256, height: 256, dtype: 'float32' }); // to the model
  * frame.accept(picture); // from the model
  * frame.present('filtered', canvasTexture);

@@ -205,7 +205,7 @@ export class GlRenderer {
   }
 
   /**
-   * Looks into the last frame at single points of it, as `Renderer.probeDepth` does. Waits for the GPU: for clicks and labels, not for every frame.
+   * Looks into the last frame at single points of it, as `Viewpoint.probe` does. Waits for the GPU: for clicks and labels, not for every frame.
    */
   probe(points: readonly ProbePoint[]): ProbeAnswer[] {
     const gl = this.#gl;
