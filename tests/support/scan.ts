@@ -1,11 +1,11 @@
 import type { Threads } from '@gaussian-splat/renderer/tools';
-import { layouts, PlanStage, scanBytes } from '@gaussian-splat/renderer/stages';
+import { layouts, planStage, scanBytes } from '@gaussian-splat/renderer/stages';
 import type { Bench } from './gpu.js';
 
 /** Exclusive prefix sums of numbers as the stage `plan` makes them, and behind them the total. */
 export async function scanOnGpu(bench: Bench, values: ArrayLike<number>, threads: Threads): Promise<Uint32Array> {
   const { length } = values;
-  const stage = new PlanStage(bench.device, threads);
+  const stage = planStage(bench.device, threads);
   const words = new Uint32Array(scanBytes(length) / 4);
   words.set(values);
   const buffer = bench.buffer(words);

@@ -1,13 +1,14 @@
 import { GaussianSplatError, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import * as layouts from './generated/clip-layouts.js';
+import { animate } from './generated/clip-shaders.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
 import { animationBytes, planeCodes, type PackedAnimation } from './pack/pack-animated.js';
-import { AnimateStage } from './stages/animate.js';
+import { Stage } from './stages/stage.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
 const { CULL_GROUP } = constants;
@@ -57,7 +58,7 @@ export class AnimatedGaussians implements GaussianScene {
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
-  readonly #stage: AnimateStage;
+  readonly #stage: Stage<typeof animate>;
   readonly #slots: readonly (readonly SlotPart[])[];
   readonly #grow: number;
   #version = 0;
@@ -79,7 +80,7 @@ export class AnimatedGaussians implements GaussianScene {
     );
     this.#memory = new GpuMemory(device);
     try {
-      this.#stage = new AnimateStage(device);
+      this.#stage = new Stage(device, animate, constants.CULL_GROUP);
       const { storage, copySource } = BUFFER_USAGE;
       const part = (name: string, words: number): GPUBuffer =>
         this.#memory.buffer(`gs.animate.${name}`, 4 * words, storage | copySource);

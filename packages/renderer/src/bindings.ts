@@ -2,39 +2,36 @@ import type { GeometryReading } from './geometry-reading.js';
 import type { PageRequests } from './gaussian-scene.js';
 import type { PageTable } from './page-table.js';
 import type { Scratch } from './scratch.js';
-import { CompactStage } from './stages/compact.js';
-import { CullChunksStage, CullStage } from './stages/cull.js';
-import type { DetailBudgetStage } from './stages/detail-budget.js';
-import { PlanStage } from './stages/plan.js';
-import { ProjectStage } from './stages/project.js';
+import type { DetailBudget } from './stages/detail-budget.js';
 import { SortStage } from './stages/sort.js';
+import { compactStage, cullChunksStage, cullStage, planStage, projectStage } from './stages/stage.js';
 import type { Variants } from './variants.js';
 
 /** The stages before the rasterizer; each is a shader of the same name. */
 export interface Stages {
-  readonly cullChunks: CullChunksStage;
-  readonly plan: PlanStage;
-  readonly compact: CompactStage;
+  readonly cullChunks: ReturnType<typeof cullChunksStage>;
+  readonly plan: ReturnType<typeof planStage>;
+  readonly compact: ReturnType<typeof compactStage>;
   readonly sort: SortStage;
   /** Those that read geometry of a kind. */
   readonly reading: (kind?: GeometryReading) => ReadingStages;
 }
 
 interface ReadingStages {
-  readonly cull: CullStage;
-  readonly project: ProjectStage;
+  readonly cull: ReturnType<typeof cullStage>;
+  readonly project: ReturnType<typeof projectStage>;
 }
 
 export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threads'>): Stages {
   const readingStages = (kind?: GeometryReading): ReadingStages => ({
-    cull: new CullStage(device, threads, kind),
-    project: new ProjectStage(device, kind),
+    cull: cullStage(device, threads, kind),
+    project: projectStage(device, kind),
   });
   const packed = readingStages();
   return {
-    cullChunks: new CullChunksStage(device),
-    plan: new PlanStage(device, threads),
-    compact: new CompactStage(device),
+    cullChunks: cullChunksStage(device),
+    plan: planStage(device, threads),
+    compact: compactStage(device),
     sort: new SortStage(device, threads),
     reading: (kind) => (kind ? readingStages(kind) : packed),
   };
@@ -54,7 +51,7 @@ interface PageBindings {
 
 /** What keeps a frame within a budget of splats, bound to the chunks of each page and to what they sum up to. */
 interface BudgetBindings {
-  readonly stage: DetailBudgetStage;
+  readonly stages: DetailBudget;
   readonly count: readonly GPUBindGroup[];
   readonly allow: GPUBindGroup;
 }
@@ -107,14 +104,14 @@ function bindBudget(
   table: PageTable,
   { detailCounts: detail_counts, chunkShares }: Scratch,
 ): BudgetBindings | undefined {
-  const stage = table.detailBudget;
+  const stages = table.detailBudget;
   return (
-    stage && {
-      stage,
+    stages && {
+      stages,
       count: table.pages.map(({ chunks, details = chunks }, i) =>
-        stage.bindCount({ view: table.view(i), chunks, details, detail_counts }),
+        stages.count.bind({ view: table.view(i), chunks, details, detail_counts }),
       ),
-      allow: stage.bindAllow({ view: table.view(0), detail_counts, chunk_shares: chunkShares }),
+      allow: stages.allow.bind({ view: table.view(0), detail_counts, chunk_shares: chunkShares }),
     }
   );
 }

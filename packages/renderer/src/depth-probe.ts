@@ -2,9 +2,10 @@ import type { FrameBindings, Stages } from './bindings.js';
 import { recordSurvivors } from './frame.js';
 import { probeDepth, probeSurface, probeSurfaceQuantized } from './generated/probe-shaders.js';
 import { layouts } from './generated/shaders.js';
-import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources, type ShaderDescription } from './gpu/kernel.js';
+import { BUFFER_USAGE, kernelOf, type ShaderDescription } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { readBack } from './gpu/read-back.js';
+import { Stage } from './stages/stage.js';
 
 /** A point of the image that was drawn last. */
 export interface ProbePoint {
@@ -40,21 +41,7 @@ export interface ProbeSource {
 }
 
 /** Opacity and depth under single points of the last frame; a workgroup a point. */
-export class ProbeDepthStage {
-  readonly #kernel: ComputeKernel<typeof probeDepth>;
-
-  constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, probeDepth);
-  }
-
-  bind(resources: Resources<typeof probeDepth>): GPUBindGroup {
-    return this.#kernel.bind(resources);
-  }
-
-  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, points: number): void {
-    this.#kernel.dispatch(pass, bindings, points);
-  }
-}
+export const probeDepthStage = (device: GPUDevice): Stage<typeof probeDepth> => new Stage(device, probeDepth);
 
 const { storage, copySource, copyDestination } = BUFFER_USAGE;
 const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
@@ -77,7 +64,7 @@ export async function probe(
     const { plan, splats, order } = source.bindings.scratch;
     // The list of survivors, which the surfaces need, takes the place of the order for a moment.
     const kept = memory.buffer('gs.probe_depth.order', order[0].size, copySource | copyDestination);
-    const stage = new ProbeDepthStage(device);
+    const stage = probeDepthStage(device);
     const encoder = device.createCommandEncoder({ label: 'gs.probe_depth' });
     const pass = encoder.beginComputePass({ label: 'gs.probe_depth' });
     stage.record(pass, stage.bind({ plan, splats, order: order[0], points: asked, answers }), points.length);

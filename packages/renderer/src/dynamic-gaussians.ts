@@ -7,9 +7,9 @@ import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { readPlaces } from './read-places.js';
-import { IngestStage } from './stages/ingest.js';
+import { ingestStage } from './stages/ingest.js';
 import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
-import { cullGroups } from './stages/cull.js';
+import { cullGroups } from './stages/stage.js';
 import { countBytes, ingestValues, TensorPlaces } from './tensor-places.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
@@ -68,7 +68,7 @@ export class DynamicGaussians implements GaussianScene {
   readonly pages: readonly DynamicPage[];
   readonly layout: GaussianLayout;
   readonly #device: GPUDevice;
-  readonly #stage: IngestStage;
+  readonly #stage: ReturnType<typeof ingestStage>;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
   readonly #places: TensorPlaces;
@@ -88,7 +88,7 @@ export class DynamicGaussians implements GaussianScene {
     this.filterVariance = options.filterVariance;
     const bytes = layout.capacity * bytesPerSplat(this.shDegree, this.shPrecision);
     this.#reservation = MemoryLedger.of(device).reserve(whatOf(layout), bytes, options.memoryBudget);
-    this.#stage = new IngestStage(device);
+    this.#stage = ingestStage(device);
     this.#memory = new GpuMemory(device);
     try {
       this.#places = new TensorPlaces(layout, this.#memory);

@@ -58,8 +58,8 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
 /** Finds the error on screen that leaves as many splats as the frame may look at. */
 function keepWithinBudget(pass: GPUComputePassEncoder, { pages, budget }: FrameBindings): void {
   if (!budget) return;
-  pages.forEach(({ splatCount }, i) => budget.stage.recordCount(pass, budget.count[i], splatCount));
-  budget.stage.recordAllow(pass, budget.allow);
+  pages.forEach(({ splatCount }, i) => budget.stages.count.record(pass, budget.count[i], splatCount));
+  budget.stages.allow.record(pass, budget.allow);
 }
 
 /** Streamed scenes that want to know now which pages the view asks for. */

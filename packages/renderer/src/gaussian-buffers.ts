@@ -7,7 +7,7 @@ import { turn } from './gpu/page-thread.js';
 import { MemoryLedger, type Reservation } from './memory-ledger.js';
 import { DETAIL_NUMBERS } from './levels/chunk-detail.js';
 import { type PackedGaussians } from './pack/pack.js';
-import type { DetailBudgetStage } from './stages/detail-budget.js';
+import type { DetailBudget } from './stages/detail-budget.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 export interface UploadOptions {
@@ -34,12 +34,12 @@ export class GaussianBuffers implements GaussianScene {
   readonly pages: readonly GaussianPage[];
   readonly version = 0;
   /** If there are levels of detail. */
-  readonly detailBudget: DetailBudgetStage | undefined;
+  readonly detailBudget: DetailBudget | undefined;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
   readonly #contents: readonly Content[];
 
-  private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number, budget?: DetailBudgetStage) {
+  private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number, budget?: DetailBudget) {
     this.detailBudget = budget;
     ({
       count: this.count,
@@ -93,10 +93,10 @@ export class GaussianBuffers implements GaussianScene {
 }
 
 /** Few scenes have levels of detail. */
-const budgetOn = (device: GPUDevice): Promise<DetailBudgetStage> =>
+const budgetOn = (device: GPUDevice): Promise<DetailBudget> =>
   loadModule('the code for budgets of splats', async () => {
-    const { DetailBudgetStage } = await import('./stages/detail-budget.js');
-    return new DetailBudgetStage(device);
+    const { detailBudgetOn } = await import('./stages/detail-budget.js');
+    return detailBudgetOn(device);
   });
 
 const whatOf = ({ count }: PackedGaussians): string => `scene of ${count} splats`;

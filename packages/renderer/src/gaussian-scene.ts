@@ -2,7 +2,7 @@ import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
 import type { RenderSettings } from './render-settings.js';
-import type { DetailBudgetStage } from './stages/detail-budget.js';
+import type { DetailBudget } from './stages/detail-budget.js';
 import type { ShPrecision } from './pack/words.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
@@ -55,7 +55,7 @@ export interface GaussianScene {
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
   /** Of a scene with levels of detail: what keeps its frames within `RenderSettings.splatBudget`. Such scenes bring it, so that no other page loads it. */
-  readonly detailBudget?: DetailBudgetStage | undefined;
+  readonly detailBudget?: DetailBudget | undefined;
   /** Of a scene that is streamed: where views record the pages that they need. */
   readonly pageRequests?: PageRequests;
   /** Called before each frame: a streamed scene uploads what has come. */

@@ -5,8 +5,8 @@ import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import type { RenderSettings } from './render-settings.js';
-import { cullGroups } from './stages/cull.js';
-import type { DetailBudgetStage } from './stages/detail-budget.js';
+import { cullGroups } from './stages/stage.js';
+import type { DetailBudget } from './stages/detail-budget.js';
 import { cameraValues, MAX_FLOAT32 } from './view.js';
 import type { Placement, World } from './world.js';
 import { SH_PRECISION } from './pack/words.js';
@@ -93,7 +93,7 @@ export class PageTable {
   }
 
   /** What keeps frames within a budget of splats; undefined without levels of detail. */
-  get detailBudget(): DetailBudgetStage | undefined {
+  get detailBudget(): DetailBudget | undefined {
     return this.#placements.find(({ scene }) => scene.detailBudget)?.scene.detailBudget;
   }
 

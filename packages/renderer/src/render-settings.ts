@@ -1,6 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import type { Threads } from './stages/plan.js';
+import type { Threads } from './stages/stage.js';
 
 /**
  * Everything that trades accuracy for speed, one setting each. docs/frontier has what each costs and saves.

@@ -2,7 +2,7 @@ import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import type { PageTable } from './page-table.js';
-import { scanBytes } from './stages/plan.js';
+import { scanBytes } from './stages/stage.js';
 
 /** How much the buffers between the stages must hold. */
 export interface ScratchSize {

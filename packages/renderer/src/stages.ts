@@ -3,7 +3,7 @@ export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
 export { CapacityMemory, type Capacity, type LookedAt } from './capacity-memory.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
 export { ROUNDS } from './choice/search.js';
-export { ProbeDepthStage } from './depth-probe.js';
+export { probeDepthStage } from './depth-probe.js';
 export * from './generated/budget-shaders.js';
 export * from './generated/depth-shaders.js';
 export * from './generated/linear-shaders.js';
@@ -39,14 +39,19 @@ export { isOfPlanes, mortonOrder } from './pack/morton.js';
 export { recentred } from './pack/recentre.js';
 export { SH_PRECISION, shWords } from './pack/words.js';
 export { Scratch } from './scratch.js';
-export { CompactStage } from './stages/compact.js';
 export { ComposeStage } from './stages/compose.js';
-export { CullChunksStage, cullGroups, CullStage } from './stages/cull.js';
-export { DetailBudgetStage } from './stages/detail-budget.js';
-export { IngestStage } from './stages/ingest.js';
-export { PlanStage, scanBytes } from './stages/plan.js';
-export { ProjectStage } from './stages/project.js';
+export { detailBudgetOn } from './stages/detail-budget.js';
+export { ingestStage } from './stages/ingest.js';
 export { sortedIn, SortStage, type SortBuffers } from './stages/sort.js';
+export {
+  compactStage,
+  cullChunksStage,
+  cullGroups,
+  cullStage,
+  planStage,
+  projectStage,
+  scanBytes,
+} from './stages/stage.js';
 export { leafLevel, type SplatLevel } from './levels/splat-level.js';
 export { cameraValues } from './view.js';
 export { Ingest } from './generated/live-layouts.js';

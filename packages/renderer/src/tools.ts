@@ -47,7 +47,7 @@ export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './
 export { levelSource, packLevelPage } from './streaming/level-source.js';
 export { readPacked } from './pack/packed-scene.js';
 export { boundsOfWorld } from './world-bounds.js';
-export { type Threads } from './stages/plan.js';
+export { type Threads } from './stages/stage.js';
 export { bytesPerSplat, type Reservation } from './memory-ledger.js';
 export {
   boundsOfPacked,

@@ -1,9 +1,9 @@
 import {
-  CompactStage,
+  compactStage,
   constants,
   cullGroups,
   layouts,
-  PlanStage,
+  planStage,
   scanBytes,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
@@ -47,7 +47,7 @@ async function compactBits(
   counts: readonly number[],
   capacity: number,
 ): Promise<Uint32Array> {
-  const stage = new CompactStage(bench.device);
+  const stage = compactStage(bench.device);
   const survivors = bench.buffer(new Uint32Array(capacity).fill(0xffffffff));
   const [bitBuffer, offsetBuffer] = [bench.buffer(bits), bench.buffer(offsets)];
   counts.forEach((count, page) => {
@@ -91,7 +91,7 @@ async function checkPlan(bench: Bench, pages: readonly boolean[][], capacity: nu
   const visible = Math.min(total, capacity);
   for (const threads of ['parallel', 'serial'] as const) {
     const plan = bench.buffer(planSize);
-    const stage = new PlanStage(bench.device, threads);
+    const stage = planStage(bench.device, threads);
     const bindings = stage.bind({
       limits: bench.uniform(pages.length, capacity, groups),
       values: bench.buffer(counts),

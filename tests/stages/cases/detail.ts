@@ -3,9 +3,9 @@ import { packWithDetail } from '@gaussian-splat/renderer/tools';
 import {
   cameraValues,
   constants,
-  CullChunksStage,
+  cullChunksStage,
   cullGroups,
-  DetailBudgetStage,
+  detailBudgetOn,
   layouts,
   SH_PRECISION,
   writeStruct,
@@ -42,18 +42,18 @@ async function cutOnGpu(
   initial[groups] = 0;
   const shares = bench.buffer(new Uint32Array(initial.buffer));
   const counts = bench.buffer(4 * constants.DETAIL_COUNTS);
-  const [stage, budgetStage] = [new CullChunksStage(device), new DetailBudgetStage(device)];
+  const [stage, budgetStage] = [cullChunksStage(device), detailBudgetOn(device)];
   const bindings = stage.bind({
     ...{ view: uniform, chunks, details, chunk_shares: shares },
     group_counts: bench.buffer(4 * groups),
     visible_bits: bench.buffer(4 * constants.WORDS_PER_GROUP * groups),
   });
-  const counting = budgetStage.bindCount({ view: uniform, chunks, details, detail_counts: counts });
-  const allowing = budgetStage.bindAllow({ view: uniform, detail_counts: counts, chunk_shares: shares });
+  const counting = budgetStage.count.bind({ view: uniform, chunks, details, detail_counts: counts });
+  const allowing = budgetStage.allow.bind({ view: uniform, detail_counts: counts, chunk_shares: shares });
   bench.compute((pass) => {
     if (budget > 0) {
-      budgetStage.recordCount(pass, counting, packed.count);
-      budgetStage.recordAllow(pass, allowing);
+      budgetStage.count.record(pass, counting, packed.count);
+      budgetStage.allow.record(pass, allowing);
     }
     stage.record(pass, bindings, packed.count);
   });

@@ -1,5 +1,5 @@
 /** Probing points of a frame, against a walk over the same splats one by one. */
-import { layouts, ProbeDepthStage } from '@gaussian-splat/renderer/stages';
+import { layouts, probeDepthStage } from '@gaussian-splat/renderer/stages';
 import { check, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
 
 const ALPHA_MIN = 1 / 255;
@@ -97,7 +97,7 @@ async function checkProbe(bench: Bench, count: number, maxOpacity: number): Prom
   }));
   const plan = new Uint32Array((layouts.Plan.size + layouts.PagePlan.size) / 4);
   plan[layouts.Plan.fields.visible.offset / 4] = count;
-  const stage = new ProbeDepthStage(bench.device);
+  const stage = probeDepthStage(bench.device);
   const answers = bench.buffer(points.length * layouts.ProbeAnswer.size);
   const asked = Float32Array.from(points.flatMap(({ x, y, depth }) => [x, y, depth, 0]));
   const bindings = stage.bind({

@@ -4,12 +4,12 @@ import type { Threads } from '@gaussian-splat/renderer/tools';
 import {
   cameraValues,
   constants,
-  CullChunksStage,
+  cullChunksStage,
   cullGroups,
-  CullStage,
+  cullStage,
   layouts,
   mortonOrder,
-  ProjectStage,
+  projectStage,
   SH_PRECISION,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
@@ -69,7 +69,7 @@ export async function cullOnGpu(
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
   const shared = { view, visible_bits: bits, group_counts: counts };
   const shares = bench.buffer(4 * (groups + 1));
-  const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device, threads)];
+  const [chunkStage, stage] = [cullChunksStage(bench.device), cullStage(bench.device, threads)];
   const chunkBindings = chunkStage.bind({
     ...shared,
     chunks,
@@ -159,7 +159,7 @@ export async function projectOnGpu(
   const keys = bench.buffer(4 * count);
   const survivors = bench.buffer(Uint32Array.from({ length: count }, (_, i) => i));
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
-  const stage = new ProjectStage(device);
+  const stage = projectStage(device);
   const chunk_shares = bench.buffer(new Uint32Array(new Float32Array(cullGroups(count) + 1).fill(1).buffer));
   const bindings = stage.bind({
     view,

@@ -6,7 +6,7 @@ import {
   constants,
   cullGroups,
   GpuMemory,
-  IngestStage,
+  ingestStage,
   Ingest,
   layouts,
   pageCapacity,
@@ -103,7 +103,7 @@ function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: Gaus
       const words = new Uint32Array(numbers.buffer, numbers.byteOffset, numbers.length);
       return passing.buffer(`gs.economise.${name}`, words.byteLength, BUFFER_USAGE.storage, words);
     };
-    const stage = new IngestStage(device);
+    const stage = ingestStage(device);
     const bindings = stage.bind({
       ingest: uniformOf(passing, cloud.shDegree, page.count),
       ...{ positions: part('positions'), shapes: part('scales'), rotations: part('rotations') },

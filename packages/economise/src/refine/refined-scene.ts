@@ -5,7 +5,7 @@ import {
   BUFFER_USAGE,
   constants,
   GpuMemory,
-  IngestStage,
+  ingestStage,
   Ingest,
   pageCapacity,
   recentred,
@@ -56,7 +56,7 @@ export class RefinedScene implements GaussianScene {
   readonly screen: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
-  readonly #ingest: IngestStage;
+  readonly #ingest: ReturnType<typeof ingestStage>;
   readonly #cloud: GaussianCloud;
   #version = 0;
 
@@ -69,7 +69,7 @@ export class RefinedScene implements GaussianScene {
     this.#device = device;
     this.#memory = memory;
     this.#cloud = cloud;
-    this.#ingest = new IngestStage(device);
+    this.#ingest = ingestStage(device);
     ({
       count: this.count,
       shDegree: this.shDegree,

@@ -2,8 +2,8 @@
 import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
-import { PlanStage, scanBytes, type Threads } from '../stages/plan.js';
 import { SortStage } from '../stages/sort.js';
+import { planStage, scanBytes, type Threads } from '../stages/stage.js';
 
 const { DIGITS, SORT_BLOCK } = constants;
 /** So many that the sums over blocks are shared among threads; the last block is not full. */
@@ -33,7 +33,7 @@ export async function sumsAndSorts(device: GPUDevice, threads: Threads): Promise
   });
   const counts = new Uint32Array(scanBytes(COUNTS) / WORD).map((_, i) => (7 * i) % 257);
   const values = make(counts);
-  const plan = new PlanStage(device, threads);
+  const plan = planStage(device, threads);
   const sums = plan.bind({
     values,
     limits: make(Uint32Array.of(1, 0xffffffff, COUNTS, 0), uniform),

@@ -4,7 +4,7 @@ import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
-import type { DetailBudgetStage } from '../stages/detail-budget.js';
+import type { DetailBudget } from '../stages/detail-budget.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
 import type { PackedLevels } from './packed-levels.js';
 import type { ShPrecision } from '../pack/words.js';
@@ -68,7 +68,7 @@ export class DetailedGaussians implements GaussianScene {
     }
   }
 
-  get detailBudget(): DetailBudgetStage | undefined {
+  get detailBudget(): DetailBudget | undefined {
     return this.#coarser.detailBudget;
   }
 

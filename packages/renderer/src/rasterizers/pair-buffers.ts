@@ -2,7 +2,7 @@
 import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
-import { scanBytes } from '../stages/plan.js';
+import { scanBytes } from '../stages/stage.js';
 import type { RasterizerInputs, Room } from './rasterizer.js';
 
 const { PREFIX_THREADS, PROJECT_GROUP, SORT_BLOCK, DIGITS } = constants;

@@ -3,7 +3,7 @@ import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
-import type { Threads } from '../stages/plan.js';
+import type { Threads } from '../stages/stage.js';
 import { TRAINED_TRANSMITTANCE } from '../render-settings.js';
 import type {
   AccumulationFormat,

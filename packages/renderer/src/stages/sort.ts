@@ -10,7 +10,7 @@ import {
 } from '../generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, perDevice, type ComputeKernel } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
-import type { Threads } from './plan.js';
+import type { Threads } from './stage.js';
 
 /** The buffers that {@link SortStage} works on. */
 export interface SortBuffers {

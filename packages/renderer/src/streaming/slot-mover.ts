@@ -1,27 +1,11 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { layouts } from '../generated/shaders.js';
 import type { GaussianPage } from '../gaussian-scene.js';
-import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { moveQuantizedSlots } from '../generated/quantized-shaders.js';
 import { moveSlots } from '../generated/streamed-shaders.js';
-
-/** Moves the splats of slots: see shaders/move_slots.wgsl, and for quantized geometry shaders/move_quantized_slots.wgsl. */
-export class MoveSlotsStage {
-  readonly #kernel: ComputeKernel<typeof moveSlots | typeof moveQuantizedSlots>;
-
-  constructor(device: GPUDevice, geometry?: 'quantized') {
-    this.#kernel = kernelOf(device, geometry ? moveQuantizedSlots : moveSlots);
-  }
-
-  bind(resources: Resources<typeof moveSlots>): GPUBindGroup {
-    return this.#kernel.bind(resources);
-  }
-
-  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, slots: number): void {
-    this.#kernel.dispatchGrid(pass, bindings, slots, 1);
-  }
-}
+import { Stage } from '../stages/stage.js';
 
 /** Slots that are moved in one submission. */
 const MOST_MOVES = 256;
@@ -31,7 +15,7 @@ const { by: BY, slot: SLOT } = layouts.SlotMove.fields;
 /** Moves what was written into slots, on the GPU: reading and writing it on the page's thread would cost that as much as the upload. */
 export class SlotMover {
   readonly #device: GPUDevice;
-  readonly #stage: MoveSlotsStage;
+  readonly #stage: Stage<typeof moveSlots | typeof moveQuantizedSlots>;
   readonly #pages: readonly { readonly moves: GPUBuffer; readonly bindings: GPUBindGroup }[];
   readonly #slotsPerBuffer: number;
   readonly #pending = new Map<number, Vector3>();
@@ -43,7 +27,7 @@ export class SlotMover {
     { slotsPerBuffer, geometry }: { readonly slotsPerBuffer: number; readonly geometry?: 'quantized' },
   ) {
     this.#device = device;
-    this.#stage = new MoveSlotsStage(device, geometry);
+    this.#stage = new Stage(device, geometry ? moveQuantizedSlots : moveSlots);
     this.#slotsPerBuffer = slotsPerBuffer;
     const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination;
     this.#pages = pages.map(({ geometry }) => {

@@ -3,7 +3,7 @@ import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
-import { DetailBudgetStage } from '../stages/detail-budget.js';
+import { detailBudgetOn, type DetailBudget } from '../stages/detail-budget.js';
 import { ARRIVAL_MS, Arrivals } from './arrivals.js';
 import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
 import { NONE } from './page-list.js';
@@ -91,7 +91,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly pages: readonly GaussianPage[];
-  readonly detailBudget: DetailBudgetStage;
+  readonly detailBudget: DetailBudget;
   /** Page requests of the views: for the renderer. */
   readonly pageRequests: WishReader;
   readonly #source: PageSource;
@@ -123,7 +123,7 @@ export class StreamedGaussians implements GaussianScene {
       origin,
     ];
     this.bounds = bounds;
-    this.detailBudget = new DetailBudgetStage(device);
+    this.detailBudget = detailBudgetOn(device);
     this.leafCount = scene.splats;
     this.#source = source;
     this.#options = options;

@@ -1,30 +1,13 @@
 import type { Camera, Vector3 } from '@gaussian-splat/core';
 import type { NotedPage, PageRequests, WishLevers } from '../gaussian-scene.js';
-import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { cameraValues } from '../view.js';
 import { CameraMotion } from './camera-motion.js';
 import { MOST_VIEWS, SeenViews } from './seen-views.js';
 import { constants } from '../generated/shaders.js';
 import { noteWishes } from '../generated/streamed-shaders.js';
-import { cullGroups } from '../stages/cull.js';
-
-/** Which pages of a streamed scene a view asks for. */
-export class NoteWishesStage {
-  readonly #kernel: ComputeKernel<typeof noteWishes>;
-
-  constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, noteWishes);
-  }
-
-  bind(resources: Resources<typeof noteWishes>): GPUBindGroup {
-    return this.#kernel.bind(resources);
-  }
-
-  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
-    this.#kernel.dispatch(pass, bindings, Math.ceil(cullGroups(splatCount) / constants.WISH_THREADS));
-  }
-}
+import { Stage } from '../stages/stage.js';
 
 /** Frames between two looks at what is wished for: of a camera that rests, and of one that moves. Both odd, for two views that are drawn in turn. */
 const INTERVAL = 5;
@@ -51,7 +34,7 @@ export interface WishReaderOptions {
 
 /** Brings what views wish for back from the GPU, now and then, with nobody waiting for it. */
 export class WishReader implements PageRequests {
-  readonly #stage: NoteWishesStage;
+  readonly #stage: Stage<typeof noteWishes>;
   /** For each page the bits of the pixels that doing without it costs, a float32; at 0, the page that is always there, what the view lacks. Cleared before each look. */
   readonly #wishes: GPUBuffer;
   readonly #staging: GPUBuffer;
@@ -70,7 +53,7 @@ export class WishReader implements PageRequests {
   constructor(device: GPUDevice, memory: GpuMemory, options: WishReaderOptions) {
     this.#device = device;
     this.#options = options;
-    this.#stage = new NoteWishesStage(device);
+    this.#stage = new Stage(device, noteWishes, constants.CULL_GROUP * constants.WISH_THREADS);
     const { storage, uniform, copySource, copyDestination, mapRead } = BUFFER_USAGE;
     const bytes = 4 * options.pages;
     this.#wishes = memory.buffer('gs.wishes', bytes, storage | copySource | copyDestination);
