@@ -1,4 +1,4 @@
-/** Where a camera will be, files that hold several pages, the pace of uploads, and what they give to a flight over a streamed scene: simulated, without a GPU. */
+/** Where a camera will be, the pace of uploads, and what they give to a flight over a streamed scene: simulated, without a GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { eyeOf, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
@@ -6,7 +6,6 @@ import {
   CameraMotion,
   folderSource,
   MOST_UPLOAD_BYTES,
-  PageFiles,
   UPLOAD_SHARE,
   UploadPace,
 } from '@gaussian-splat/renderer/stages';
@@ -92,59 +91,6 @@ test('a matrix that is no rotation is moved, not turned', () => {
   for (const k of [0, 1, 2, 4, 5, 6, 8, 9, 10]) {
     assert.ok(Math.abs(then.worldToCamera[k] - now.worldToCamera[k]) < 1e-9);
   }
-});
-
-/** Files of a kilobyte, which come or fail when told to. */
-function shelf(most: number) {
-  const open = new Map<string, { arrive: () => void; fail: () => void; signal: AbortSignal }>();
-  let fetched = 0;
-  const files = new PageFiles((file, signal) => {
-    fetched++;
-    return new Promise((resolve, reject) => {
-      open.set(file, { arrive: () => resolve(new ArrayBuffer(1000)), fail: () => reject(new Error(file)), signal });
-    });
-  }, most);
-  return { files, open, fetched: () => fetched };
-}
-
-test('a file is fetched once for all that wait for it, kept, and fetched again when others took its place', async () => {
-  const { files, open, fetched } = shelf(2500);
-  const { signal } = new AbortController();
-  const both = [files.get('a', signal), files.get('a', signal)];
-  open.get('a')!.arrive();
-  assert.equal(await both[0], await both[1]);
-  await files.get('a', signal);
-  assert.equal(fetched(), 1);
-  for (const name of ['b', 'a', 'c']) {
-    const coming = files.get(name, signal);
-    open.get(name)!.arrive();
-    await coming;
-  }
-  assert.equal(fetched(), 3, 'two fit: a and c are those used last');
-  await files.get('a', signal);
-  assert.equal(fetched(), 3);
-  void files.get('b', signal);
-  assert.equal(fetched(), 4);
-});
-
-test('a fetch ends when the last who waits gives up, and a file that failed may be asked for again', async () => {
-  const { files, open, fetched } = shelf(2500);
-  const [one, other] = [new AbortController(), new AbortController()];
-  const waiting = [files.get('a', one.signal), files.get('a', other.signal)];
-  one.abort();
-  const { signal, fail } = open.get('a')!;
-  assert.ok(!signal.aborted, 'another still waits');
-  other.abort();
-  assert.ok(signal.aborted);
-  fail();
-  for (const result of await Promise.allSettled(waiting)) assert.equal(result.status, 'rejected');
-  const again = files.get('a', new AbortController().signal);
-  assert.equal(fetched(), 2);
-  open.get('a')!.fail();
-  await assert.rejects(again, /a/);
-  const third = files.get('a', new AbortController().signal);
-  open.get('a')!.arrive();
-  assert.equal((await third).byteLength, 1000);
 });
 
 test('a file that comes short is refused and fetched again, and a view of bytes is as good as their buffer', async () => {

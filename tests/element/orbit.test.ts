@@ -11,7 +11,7 @@ import {
   toScene,
   toViewer,
   viewerFrame,
-  type Pose,
+  type CameraPose,
 } from '../../packages/element/src/camera/orbit.js';
 import { OrbitCamera } from '../../packages/element/src/camera/orbit-camera.js';
 import { limitsOf, poseOf } from '../../packages/element/src/camera/settings.js';
@@ -71,7 +71,7 @@ test("the camera of a pose is core's lookAt from the same eye, for every up axis
   fc.assert(
     fc.property(fc.constantFrom(...UPS), angle, phi, length, length, length, (up, theta, phi, x, y, z) => {
       const frame = viewerFrame(up);
-      const pose: Pose = { theta, phi, radius: 3, x, y, z, fieldOfView: 1 };
+      const pose: CameraPose = { theta, phi, radius: 3, x, y, z, fieldOfView: 1 };
       const camera = cameraOfPose(pose, frame, 640, 480, 0.2);
       // Spherical coordinates as the attributes define them, from the formula and not from the code.
       const eye = toScene(frame, [
@@ -159,7 +159,7 @@ test('limits hold for gestures', () => {
 });
 
 test('a pan moves the target with the pointer: its point stays under it', () => {
-  const pose: Pose = { theta: 0.7, phi: 1.1, radius: 4, x: 0, y: 0, z: 0, fieldOfView: 0.9 };
+  const pose: CameraPose = { theta: 0.7, phi: 1.1, radius: 4, x: 0, y: 0, z: 0, fieldOfView: 0.9 };
   const camera = new OrbitCamera(pose);
   const drag = panOf({ x: 10, y: 10 }, { x: 60, y: -20 }, 300);
   assert.equal(drag.type, 'pan');

@@ -1,7 +1,7 @@
 /** Files that several frames of a sequence need are read once, for as long as one of them waits, and forgotten where they take much. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { SharedReads } from '../../packages/element/src/loading/shared-reads.js';
+import { SharedReads } from '@gaussian-splat/core/fetch';
 
 const never = new AbortController().signal;
 

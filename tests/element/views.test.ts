@@ -13,7 +13,7 @@ import {
   toScene,
   toViewer,
   viewerFrame,
-  type Pose,
+  type CameraPose,
 } from '../../packages/element/src/camera/orbit.js';
 import { ATTRIBUTES } from '../../packages/element/src/attributes.js';
 import { fieldOfViewGrammar, orbitGrammar, targetGrammar } from '../../packages/element/src/camera/grammar.js';
@@ -40,7 +40,7 @@ const near = (actual: readonly number[], expected: readonly number[], what: stri
     assert.ok(Math.abs(value - expected[i]) <= tolerance, `${what} ${i}: ${value} is not ${expected[i]}`),
   );
 
-const forwardOf = ({ theta, phi }: Pose): Vector3 =>
+const forwardOf = ({ theta, phi }: CameraPose): Vector3 =>
   orbitAxes(theta, phi).backward.map((v) => -v) as unknown as Vector3;
 
 test('words of the attributes: what is left out stays, percents and auto mean what they mean there', () => {
@@ -174,7 +174,7 @@ test('what is none says what was expected and what was found', () => {
   assert.throws(() => poseOfView(readViews([{ name: 'empty' }]).views[0].view, given), { code: 'argument/camera' });
 });
 
-const pose = (theta: number, radius: number, x = 0): Pose => ({
+const pose = (theta: number, radius: number, x = 0): CameraPose => ({
   theta,
   phi: 1.3,
   radius,
@@ -223,7 +223,7 @@ test('a flight arrives at its end, and gives way to whoever moves the camera, bu
   t.mock.timers.enable({ apis: ['setTimeout'] });
   const way = (camera: CameraController) => {
     const from = camera.goal;
-    return (ms: number): Pose => ({ ...from, theta: Math.min(1, ms / 1000), radius: 6 });
+    return (ms: number): CameraPose => ({ ...from, theta: Math.min(1, ms / 1000), radius: 6 });
   };
   const camera = framed();
   const flight = new Flight(camera, way(camera), 1000);

@@ -1,9 +1,9 @@
 /** The flight of demo/bench/detail.js without a GPU and without a clock: the same path, the real rules of who comes and goes, a server of known speed. */
 import type { Bounds, Camera } from '@gaussian-splat/core';
+import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
   aheadMs,
   CameraMotion,
-  PageFiles,
   PageTraffic,
   Residency,
   SLOT_CHUNKS,
@@ -107,7 +107,7 @@ class Server {
 export async function fly(pages: FlightPages, options: FlightOptions): Promise<FlightSecond[]> {
   const { list } = pages;
   const server = new Server(options);
-  const files = new PageFiles((file) => server.fetch(parseInt(file)), options.kept);
+  const files = new SharedReads<ArrayBuffer>(({ byteLength }) => byteLength, options.kept);
   const nameOf = (page: number): string => {
     const { file } = list.place(page);
     return `${file.chunks} ${file.file} ${options.isWithoutCopies ? list.translate(page).join() : ''}`;
@@ -117,7 +117,8 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
   residency.settle(0);
   const traffic = new PageTraffic(residency, {
     fetch: async (page, signal) => {
-      await files.get(nameOf(page), signal);
+      const name = nameOf(page);
+      await files.read(name, () => server.fetch(parseInt(name)), signal);
       return Uint32Array.of(page);
     },
     onArrival: () => undefined,

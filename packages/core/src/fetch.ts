@@ -1,3 +1,5 @@
-/** Fetching with patience and by the rules of origins: for packages that load files. */
+/** Fetching with patience, once for all that ask, and by the rules of origins: for packages that load files. */
+export * from './back-off.js';
 export * from './part-request.js';
 export * from './patient-fetch.js';
+export * from './shared-reads.js';

@@ -30,7 +30,6 @@ export { packQuantizedChunk, QUANTIZED_CHUNK_WORDS } from './streaming/quantized
 export { QUANTIZED } from './streaming/quantized-reading.js';
 export { PagePool, poolBytes, poolSize } from './streaming/page-pool.js';
 export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './streaming/page-traffic.js';
-export { PageFiles } from './streaming/page-files.js';
 export { folderSource } from './streaming/page-source.js';
 export { Residency } from './streaming/residency.js';
 export { MOST_UPLOAD_BYTES, UPLOAD_SHARE, UploadPace } from './streaming/upload-pace.js';

@@ -1,20 +1,20 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { Damper } from './damper.js';
-import { eyeOfPose, orbitAxes, type Pose } from './orbit.js';
+import { eyeOfPose, orbitAxes, type CameraPose } from './orbit.js';
 
 /** What a motion keeps on course: the target that the camera turns around, or the eye of one that flies. */
 export type Pivot = 'target' | 'eye';
 
 /** Smallest and largest value that each part of a pose may take. */
-export interface PoseLimits {
-  readonly min: Pose;
-  readonly max: Pose;
+export interface CameraLimits {
+  readonly min: CameraPose;
+  readonly max: CameraPose;
 }
 
 const KEYS = ['theta', 'phi', 'radius', 'x', 'y', 'z', 'fieldOfView'] as const;
 /** The parts of a pose that say where it is; the others say how it looks from there. */
 const PLACE = ['x', 'y', 'z'] as const;
-const everywhere = (value: number): Pose => ({
+const everywhere = (value: number): CameraPose => ({
   theta: value,
   phi: value,
   radius: value,
@@ -29,24 +29,24 @@ const everywhere = (value: number): Pose => ({
  * Knows no page, no attribute and no scene.
  */
 export class OrbitCamera {
-  #now: Pose;
-  #goal: Pose;
-  #limits: PoseLimits = { min: everywhere(-Infinity), max: everywhere(Infinity) };
+  #now: CameraPose;
+  #goal: CameraPose;
+  #limits: CameraLimits = { min: everywhere(-Infinity), max: everywhere(Infinity) };
   readonly #dampers = KEYS.map(() => new Damper());
   #pivot: Pivot = 'target';
 
-  constructor(pose: Pose) {
+  constructor(pose: CameraPose) {
     this.#now = pose;
     this.#goal = pose;
   }
 
   /** Where the camera is. */
-  get now(): Pose {
+  get now(): CameraPose {
     return this.#now;
   }
 
   /** Where it is going; the same values as {@link now} when it stands still. */
-  get goal(): Pose {
+  get goal(): CameraPose {
     return this.#goal;
   }
 
@@ -68,13 +68,13 @@ export class OrbitCamera {
   }
 
   /** Bounds of every goal from now on; the present goal is brought within them. */
-  set limits(limits: PoseLimits) {
+  set limits(limits: CameraLimits) {
     this.#limits = limits;
     this.setGoal({});
   }
 
   /** Changes parts of the goal, within the limits. */
-  setGoal(changes: Partial<Pose>): void {
+  setGoal(changes: Partial<CameraPose>): void {
     const { min, max } = this.#limits;
     const wanted = { ...this.#goal, ...changes };
     const goal = { ...wanted };
@@ -115,13 +115,13 @@ export class OrbitCamera {
   }
 
   /** The pose with the place of what is kept on course. */
-  #onCourse(pose: Pose): Pose {
+  #onCourse(pose: CameraPose): CameraPose {
     if (this.#pivot === 'target') return pose;
     const [x, y, z] = eyeOfPose(pose);
     return { ...pose, x, y, z };
   }
 
-  #offCourse(pose: Pose): Pose {
+  #offCourse(pose: CameraPose): CameraPose {
     return this.#pivot === 'target' ? pose : withTargetAhead(pose);
   }
 
@@ -181,7 +181,7 @@ export class OrbitCamera {
 }
 
 /** A pose whose place is that of its eye, with that of its target instead. */
-function withTargetAhead(pose: Pose): Pose {
+function withTargetAhead(pose: CameraPose): CameraPose {
   const { backward } = orbitAxes(pose.theta, pose.phi);
   const [x, y, z] = PLACE.map((key, axis) => pose[key] - pose.radius * backward[axis]);
   return { ...pose, x, y, z };

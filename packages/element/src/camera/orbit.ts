@@ -2,7 +2,7 @@
 import { DEFAULT_FAR, dot, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
 
 /** All that moves: the orbit, its target in viewer space, and the vertical field of view. Radians and world units. */
-export interface Pose {
+export interface CameraPose {
   readonly theta: number;
   readonly phi: number;
   readonly radius: number;
@@ -55,7 +55,7 @@ export function orbitAxes(theta: number, phi: number): { right: Vector3; up: Vec
 }
 
 /** Where the eye of a pose is, in viewer space. */
-export function eyeOfPose(pose: Pose): Vector3 {
+export function eyeOfPose(pose: CameraPose): Vector3 {
   const { backward } = orbitAxes(pose.theta, pose.phi);
   return [pose.x + pose.radius * backward[0], pose.y + pose.radius * backward[1], pose.z + pose.radius * backward[2]];
 }
@@ -76,7 +76,13 @@ export function framingDistance(radius: number, fieldOfView: number, aspect: num
 export const nearPlane = (bounds: Bounds): number => Math.min(0.2, bounds.radius / 100);
 
 /** The pinhole camera of a pose, in the scene's own frame, for a picture of width x height pixels. */
-export function cameraOfPose(pose: Pose, frame: ViewerFrame, width: number, height: number, near: number): Camera {
+export function cameraOfPose(
+  pose: CameraPose,
+  frame: ViewerFrame,
+  width: number,
+  height: number,
+  near: number,
+): Camera {
   const { right, up, backward } = orbitAxes(pose.theta, pose.phi);
   const negate = (v: Vector3): Vector3 => [-v[0], -v[1], -v[2]];
   const eyeInScene = toScene(frame, eyeOfPose(pose));

@@ -1,8 +1,8 @@
 /** What the camera attributes mean for a given scene and picture: settings with `auto` and `%` become a pose. */
 import type { Bounds, Vector3 } from '@gaussian-splat/core';
 import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting } from './grammar.js';
-import { framingDistance, toViewer, viewerFrame, type Pose, type ViewerFrame } from './orbit.js';
-import type { PoseLimits } from './orbit-camera.js';
+import { framingDistance, toViewer, viewerFrame, type CameraPose, type ViewerFrame } from './orbit.js';
+import type { CameraLimits } from './orbit-camera.js';
 
 /** All camera attributes, read. */
 export interface CameraSettings {
@@ -52,7 +52,7 @@ function distance(setting: RadiusSetting, auto: number, framing: number): number
 }
 
 /** The pose that the attributes ask for. `aspect` is width / height of the picture. */
-export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): Pose {
+export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): CameraPose {
   const fieldOfView = angle(settings.fieldOfView, AUTO.fieldOfView);
   const framing = framingDistance(bounds.radius, fieldOfView, aspect);
   const center = toViewer(frameOf(settings, bounds), bounds.center);
@@ -69,14 +69,19 @@ export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: nu
 }
 
 /** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright: by the attributes, and by a flight. */
-export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: number, asked?: Pose): PoseLimits {
+export function limitsOf(
+  settings: CameraSettings,
+  bounds: SceneBounds,
+  aspect: number,
+  asked?: CameraPose,
+): CameraLimits {
   const { minOrbit, maxOrbit } = settings;
   const pose = poseOf(settings, bounds, aspect);
   const poses = [pose, asked ?? pose];
-  const least = (auto: number, key: keyof Pose): number => Math.min(auto, ...poses.map((each) => each[key]));
-  const most = (auto: number, key: keyof Pose): number => Math.max(auto, ...poses.map((each) => each[key]));
+  const least = (auto: number, key: keyof CameraPose): number => Math.min(auto, ...poses.map((each) => each[key]));
+  const most = (auto: number, key: keyof CameraPose): number => Math.max(auto, ...poses.map((each) => each[key]));
   const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);
-  const place = (setting: TargetSetting, auto: number): Pick<Pose, 'x' | 'y' | 'z'> => {
+  const place = (setting: TargetSetting, auto: number): Pick<CameraPose, 'x' | 'y' | 'z'> => {
     const [x, y, z] = setting.map((value) => (value === 'auto' ? auto : value));
     return { x, y, z };
   };

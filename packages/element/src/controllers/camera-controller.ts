@@ -1,5 +1,12 @@
 import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { cameraOfPose, framingDistance, nearPlane, toViewer, type Pose, type ViewerFrame } from '../camera/orbit.js';
+import {
+  cameraOfPose,
+  framingDistance,
+  nearPlane,
+  toViewer,
+  type CameraPose,
+  type ViewerFrame,
+} from '../camera/orbit.js';
 import { OrbitCamera, type Pivot } from '../camera/orbit-camera.js';
 import { frameOf, limitsOf, poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
@@ -35,7 +42,7 @@ export class CameraController {
   #isTurned = false;
   #jumped = false;
   /** Where a flight has put the camera: automatic limits give way to it. */
-  #asked: Pose | undefined;
+  #asked: CameraPose | undefined;
   #lastStep: number | undefined;
 
   /** @param onChange the camera is no longer where it was drawn. */
@@ -81,7 +88,7 @@ export class CameraController {
   }
 
   /** Where it is going. */
-  get goal(): Pose {
+  get goal(): CameraPose {
     return this.#camera.goal;
   }
 
@@ -92,7 +99,7 @@ export class CameraController {
   }
 
   /** Puts the camera there at once, within the limits that the page has set: a step of a flight. */
-  moveTo(pose: Pose): void {
+  moveTo(pose: CameraPose): void {
     this.#source = 'none';
     this.#userDistance = this.#isTouched = true;
     this.#asked = pose;

@@ -1,3 +1,4 @@
+import { BackOff } from '@gaussian-splat/core/fetch';
 import type { ClipIndex } from '@gaussian-splat/formats';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 
@@ -23,9 +24,6 @@ interface Entry {
   readonly part: number;
   content?: PackedAnimation;
   abort?: AbortController;
-  failures: number;
-  /** Until when it is not asked for. */
-  until: number;
 }
 
 /** Groups of a clip in the page's memory: fetched ahead one part after the other, and dropped where there is no room, those behind the time first. */
@@ -33,6 +31,7 @@ export class GroupCache {
   readonly #index: ClipIndex;
   readonly #source: GroupSource;
   readonly #entries = new Map<string, Entry>();
+  readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, mostTries: MOST_TRIES });
   #wanted: readonly (readonly [group: number, part: number])[] = [];
   #wantedFor = '';
   #isClosed = false;
@@ -55,13 +54,13 @@ export class GroupCache {
 
   /** True of a part that has not come, until it is asked for again. */
   isMissing(group: number, part: number): boolean {
-    return performance.now() < (this.#entries.get(keyOf(group, part))?.until ?? -Infinity);
+    return this.#failures.isPaused(keyOf(group, part));
   }
 
   /** Fetches what the first frame needs. Rejects with what was thrown. */
   async first(group: number, signal: AbortSignal): Promise<void> {
     const content = await this.#source.fetchPart(group, 0, signal);
-    this.#entries.set(keyOf(group, 0), { group, part: 0, content, failures: 0, until: -Infinity });
+    this.#entries.set(keyOf(group, 0), { group, part: 0, content });
   }
 
   /** The group whose frames are shown now. */
@@ -142,19 +141,18 @@ export class GroupCache {
 
   async #fetch([group, part]: readonly [number, number]): Promise<void> {
     const key = keyOf(group, part);
-    const entry: Entry = this.#entries.get(key) ?? { group, part, failures: 0, until: -Infinity };
+    const entry: Entry = this.#entries.get(key) ?? { group, part };
     const abort = new AbortController();
     entry.abort = abort;
     this.#entries.set(key, entry);
     try {
       const content = await this.#source.fetchPart(group, part, abort.signal);
       if (abort.signal.aborted || this.#isClosed) return;
-      Object.assign(entry, { content, failures: 0 });
+      entry.content = content;
+      this.#failures.succeed(key);
     } catch (error) {
       if (abort.signal.aborted || this.#isClosed) return;
-      entry.failures++;
-      entry.until = entry.failures < MOST_TRIES ? performance.now() + RETRY_MS * 4 ** (entry.failures - 1) : Infinity;
-      if (entry.failures === 1) this.#source.onError(error);
+      if (this.#failures.fail(key) === 1) this.#source.onError(error);
     }
     entry.abort = undefined;
     this.#next();

@@ -1,6 +1,6 @@
 /** Loaded only when a sequence is shown. */
 import { type Bounds } from '@gaussian-splat/core';
-import { partRequest } from '@gaussian-splat/core/fetch';
+import { BackOff, partRequest } from '@gaussian-splat/core/fetch';
 import { frameAt, framePath, movedFrame, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -36,12 +36,6 @@ interface FetchedFrame {
   packed?: PackedGaussians;
 }
 
-/** How often a frame has not come, and until when it is not asked for. */
-interface Failure {
-  readonly times: number;
-  readonly until: number;
-}
-
 /**
  * Shows scene files that follow one another in time. The frames ahead are fetched and unpacked in the worker, as many as the memory for them allows; one that is
  * late leaves the last one on show.
@@ -55,7 +49,7 @@ export class SequencePlayer implements Timeline {
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, FetchedFrame>();
   /** By the path of the file that did not come. */
-  readonly #failures = new Map<string, Failure>();
+  readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, mostTries: MOST_TRIES });
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
   #shown = 0;
@@ -187,7 +181,7 @@ export class SequencePlayer implements Timeline {
 
   /** True of a frame that has not come, until it is asked for again. */
   #isMissing(frame: number): boolean {
-    return performance.now() < (this.#failures.get(this.#fileOf(frame))?.until ?? -Infinity);
+    return this.#failures.isPaused(this.#fileOf(frame));
   }
 
   /** Path of what a frame needs: those of one file of motion come, or are missing, together. */
@@ -200,11 +194,7 @@ export class SequencePlayer implements Timeline {
     this.#slots.delete(frame);
     // Of the frames of one file that have been waited for the first has said it.
     if (this.#isMissing(frame)) return;
-    const file = this.#fileOf(frame);
-    const times = (this.#failures.get(file)?.times ?? 0) + 1;
-    const until = times < MOST_TRIES ? performance.now() + RETRY_MS * 4 ** (times - 1) : Infinity;
-    this.#failures.set(file, { times, until });
-    if (times === 1 && !this.#isClosed) this.#options.listeners.onError(error);
+    if (this.#failures.fail(this.#fileOf(frame)) === 1 && !this.#isClosed) this.#options.listeners.onError(error);
   }
 
   #wantedFrom(frame: number): number[] {
@@ -221,7 +211,7 @@ export class SequencePlayer implements Timeline {
     try {
       const loading = load(this.#sequence, frame, this.#options, shPrecision, slot.abort.signal, () => undefined);
       slot.packed = (await loading).packed;
-      this.#failures.delete(this.#fileOf(frame));
+      this.#failures.succeed(this.#fileOf(frame));
       this.#room.note(bytesOf(slot.packed));
     } catch (error) {
       if (slot.abort.signal.aborted) return;

@@ -1,5 +1,6 @@
 /** Loaded only for sequences: for the manifest of one, and for frames that are told by what they differ by from the first. */
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
   fetchScene,
   LoadBudget,
@@ -15,7 +16,6 @@ import type { SceneBounds } from '../camera/settings.js';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
 import type { FileRequest, LoadedScene, MovedFrameRequest, ProgressListener } from './protocol.js';
-import { SharedReads } from './shared-reads.js';
 
 export { parseSequence } from '@gaussian-splat/formats';
 

@@ -1,7 +1,7 @@
 /** Places for the camera, in all the forms that pages and files have them, and the poses that they mean. */
 import { GaussianSplatError, inverse, length, normalize, subtract, type Vector3 } from '@gaussian-splat/core';
 import { fieldOfViewGrammar, orbitGrammar, targetGrammar, type AttributeGrammar } from '../camera/grammar.js';
-import { toViewer, type Pose, type ViewerFrame } from '../camera/orbit.js';
+import { toViewer, type CameraPose, type ViewerFrame } from '../camera/orbit.js';
 import { poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 
 /** A view in the words of the attributes. What is left out stays as it is. */
@@ -56,11 +56,11 @@ export interface ViewContext {
   /** Width / height of the picture. */
   readonly aspect: number;
   /** Where the camera is going now: parts that a view leaves out stay. */
-  readonly from: Pose;
+  readonly from: CameraPose;
 }
 
 /** The pose of a view. Throws `argument/camera` for one that is malformed. */
-export function poseOfView(view: CameraView, context: ViewContext): Pose {
+export function poseOfView(view: CameraView, context: ViewContext): CameraPose {
   if (typeof view !== 'object' || view === null) throw fail('view', FORMS, view);
   if ('worldToCamera' in view) return ofMatrix(view, context);
   if ('rotation' in view) return ofTrainer(view, context);
@@ -71,7 +71,10 @@ export function poseOfView(view: CameraView, context: ViewContext): Pose {
 const FORMS =
   '{ orbit, target, fieldOfView } as of the attributes, { position, lookAt }, { position, rotation } of a cameras.json, or { worldToCamera }';
 
-function ofOrbit({ orbit, target, fieldOfView }: OrbitView, { settings, bounds, aspect, from }: ViewContext): Pose {
+function ofOrbit(
+  { orbit, target, fieldOfView }: OrbitView,
+  { settings, bounds, aspect, from }: ViewContext,
+): CameraPose {
   if (orbit === undefined && target === undefined && fieldOfView === undefined)
     throw fail('view', FORMS, 'none of these');
   const read = <T>(name: string, text: string | undefined, grammar: AttributeGrammar<T>): T | undefined => {
@@ -105,14 +108,14 @@ function ofOrbit({ orbit, target, fieldOfView }: OrbitView, { settings, bounds, 
   };
 }
 
-function ofTrainer({ position, rotation, height, fy }: TrainerView, context: ViewContext): Pose {
+function ofTrainer({ position, rotation, height, fy }: TrainerView, context: ViewContext): CameraPose {
   const eye = vector('view.position', position);
   if (!isRows(rotation, 3)) throw fail('view.rotation', 'a 3x3 array of numbers, camera to world', rotation);
   const forward: Vector3 = [rotation[0][2], rotation[1][2], rotation[2][2]];
   return ofRay(toViewer(context.frame, eye), toViewer(context.frame, forward), vertical(height, fy), context);
 }
 
-function ofMatrix({ worldToCamera, K, height }: MatrixView, context: ViewContext): Pose {
+function ofMatrix({ worldToCamera, K, height }: MatrixView, context: ViewContext): CameraPose {
   const m = (worldToCamera as unknown[]).flat?.() as number[];
   const isMatrix = m?.length === 16 && m.every(Number.isFinite) && Math.hypot(m[12], m[13], m[14], m[15] - 1) < 1e-6;
   if (!isMatrix) throw fail('view.worldToCamera', 'a 4x4 array of numbers with the last row 0, 0, 0, 1', worldToCamera);
@@ -125,7 +128,7 @@ function ofMatrix({ worldToCamera, K, height }: MatrixView, context: ViewContext
   );
 }
 
-function ofLook({ position, lookAt, space, fov }: LookView, context: ViewContext): Pose {
+function ofLook({ position, lookAt, space, fov }: LookView, context: ViewContext): CameraPose {
   const [eye, target] = [vector('view.position', position), vector('view.lookAt', lookAt)].map((point) =>
     space === 'supersplat' ? toViewer(context.frame, [-point[0], -point[1], point[2]]) : point,
   );
@@ -145,7 +148,7 @@ const vertical = (height: number | undefined, focal: number | undefined): number
 const LEAST_AHEAD = 0.1;
 
 /** A camera at an eye that looks along a direction turns around the point ahead of it that is nearest to the middle of the scene. */
-function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined, context: ViewContext): Pose {
+function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined, context: ViewContext): CameraPose {
   const { bounds, frame, from } = context;
   const forward = normalize(direction);
   const toMiddle = subtract(toViewer(frame, bounds.center), eye);

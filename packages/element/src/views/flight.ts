@@ -1,5 +1,5 @@
 /** One motion of the camera along a path of time: from a frame to the next, until it has arrived or somebody else moves the camera. */
-import type { Pose } from '../camera/orbit.js';
+import type { CameraPose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 
 /** How long after its end a flight whose frames do not come is over, ms. */
@@ -7,17 +7,17 @@ const GRACE_MS = 100;
 
 export class Flight {
   readonly #camera: CameraController;
-  readonly #path: (elapsedMs: number) => Pose;
+  readonly #path: (elapsedMs: number) => CameraPose;
   readonly #durationMs: number;
   #start: number | undefined;
-  #placed: Pose | undefined;
+  #placed: CameraPose | undefined;
   #end: ((arrived: boolean) => void) | undefined;
   readonly #timer: ReturnType<typeof setTimeout> | undefined;
   /** Fulfils at the end: whether it has arrived. */
   readonly finished: Promise<boolean>;
 
   /** @param durationMs 0 jumps; Infinity never arrives */
-  constructor(camera: CameraController, path: (elapsedMs: number) => Pose, durationMs: number) {
+  constructor(camera: CameraController, path: (elapsedMs: number) => CameraPose, durationMs: number) {
     this.#camera = camera;
     this.#path = path;
     this.#durationMs = durationMs;
@@ -53,7 +53,9 @@ export class Flight {
 
   get #isElsewhere(): boolean {
     const [placed, goal] = [this.#placed, this.#camera.goal];
-    return placed !== undefined && Object.entries(placed).some(([key, value]) => goal[key as keyof Pose] !== value);
+    return (
+      placed !== undefined && Object.entries(placed).some(([key, value]) => goal[key as keyof CameraPose] !== value)
+    );
   }
 
   #place(elapsedMs: number): void {

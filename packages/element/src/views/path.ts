@@ -1,5 +1,5 @@
 /** Ways from pose to pose. Pure. */
-import type { Pose } from '../camera/orbit.js';
+import type { CameraPose } from '../camera/orbit.js';
 
 /** How a flight sets out and arrives: a name as in CSS, or a function of 0..1. */
 export type Easing = 'linear' | 'ease-in' | 'ease-out' | 'ease-in-out' | ((share: number) => number);
@@ -17,25 +17,26 @@ export const easingOf = (easing: Easing): ((share: number) => number) =>
 const KEYS = ['theta', 'phi', 'radius', 'x', 'y', 'z', 'fieldOfView'] as const;
 
 /** The same view with its azimuth at most half a turn from another's. */
-export function unwound(pose: Pose, before: Pose): Pose {
+export function unwound(pose: CameraPose, before: CameraPose): CameraPose {
   const turns = Math.round((pose.theta - before.theta) / (2 * Math.PI));
   return turns === 0 ? pose : { ...pose, theta: pose.theta - turns * 2 * Math.PI };
 }
 
 /** Distances go by factors: half of the way from 1 m to 4 m is 2 m. */
-const rise = (pose: Pose, key: (typeof KEYS)[number]): number => (key === 'radius' ? Math.log(pose.radius) : pose[key]);
+const rise = (pose: CameraPose, key: (typeof KEYS)[number]): number =>
+  key === 'radius' ? Math.log(pose.radius) : pose[key];
 
 /** A way from a time to a pose. */
-export type Path = (time: number) => Pose;
+export type Path = (time: number) => CameraPose;
 
 /**
  * A smooth path through poses: Catmull and Rom's cubic through values and times.
  * @param times one for each pose, rising.
  * @returns a function of a time, which is clamped to those; at the time of a pose it returns exactly that pose
  */
-export function pathThrough(poses: readonly Pose[], times: readonly number[]): Path {
+export function pathThrough(poses: readonly CameraPose[], times: readonly number[]): Path {
   const last = poses.length - 1;
-  const chain: Pose[] = [];
+  const chain: CameraPose[] = [];
   for (const pose of poses) chain.push(chain.length === 0 ? pose : unwound(pose, chain[chain.length - 1]));
   const slope = (k: number, key: (typeof KEYS)[number]): number => {
     // At its ends the path is straight.
@@ -56,7 +57,7 @@ export function pathThrough(poses: readonly Pose[], times: readonly number[]): P
         from + t * out + t * t * (3 * (to - from) - 2 * out - into) + t * t * t * (2 * (from - to) + out + into);
       return key === 'radius' ? Math.exp(value) : value;
     };
-    return Object.fromEntries(KEYS.map((key) => [key, at(key)])) as unknown as Pose;
+    return Object.fromEntries(KEYS.map((key) => [key, at(key)])) as unknown as CameraPose;
   };
 }
 

@@ -3,7 +3,7 @@ import { css, html, nothing, render, type ReactiveController, type ReactiveContr
 import type { Attributes } from '../attributes.js';
 import { adoptStyles } from '../styles.js';
 import type { Behaviours } from '../behaviours.js';
-import type { Pose } from '../camera/orbit.js';
+import type { CameraPose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 import { prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import type { GaussianSplatEventMap } from '../events.js';
@@ -153,7 +153,7 @@ export class Tour implements ReactiveController, Mover {
     if (path === null) return false;
     const length = duration ?? path.seconds * 1_000;
     const ease = easingOf(easing);
-    const place = (elapsed: number): Pose => path.at(ease(loop ? (elapsed % length) / length : elapsed / length));
+    const place = (elapsed: number): CameraPose => path.at(ease(loop ? (elapsed % length) / length : elapsed / length));
     this.#current = -1;
     if (prefersReducedMotion() || !(length > 0)) return this.#start(() => path.at(1), 0);
     return this.#start(place, loop ? Infinity : length);
@@ -175,7 +175,7 @@ export class Tour implements ReactiveController, Mover {
     return { views: this.#views, path };
   }
 
-  async #path(): Promise<{ at: (share: number) => Pose; seconds: number } | null> {
+  async #path(): Promise<{ at: (share: number) => CameraPose; seconds: number } | null> {
     const { views, path } = await this.#ready();
     const stops = path.length > 0 ? path : views.map(({ view }, i) => ({ time: (i * PART_MS) / 1_000, view }));
     if (stops.length === 0) return null;
@@ -212,13 +212,13 @@ export class Tour implements ReactiveController, Mover {
     const to = unwound(poseOfView(view, camera.context), from);
     const ease = easingOf(easing);
     const along = pathThrough([from, to], [0, 1]);
-    const path = (elapsed: number): Pose => (elapsed >= duration ? to : along(ease(elapsed / duration)));
+    const path = (elapsed: number): CameraPose => (elapsed >= duration ? to : along(ease(elapsed / duration)));
     this.#choose(index);
     const isSeen = this.#of.isOnShow && !prefersReducedMotion();
     return this.#start(path, isSeen ? Math.max(0, duration) : 0, index);
   }
 
-  async #start(path: (elapsed: number) => Pose, duration: number, index = -1): Promise<boolean> {
+  async #start(path: (elapsed: number) => CameraPose, duration: number, index = -1): Promise<boolean> {
     this.#flight?.cancel();
     const { behaviours, camera } = this.#of;
     const flight = (this.#flight = new Flight(camera, duration === 0 ? () => path(Infinity) : path, duration));

@@ -1,4 +1,5 @@
 import { GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { SharedReads } from '@gaussian-splat/core/fetch';
 import { LoadBudget } from '../budget.js';
 import { grouped } from '../bytes.js';
 import { checkedPart } from '../foreign-signatures.js';
@@ -10,36 +11,22 @@ import type { SogAddress, SogRun } from './boxes.js';
 /** Brings a file, or rejects; aborted when no caller waits for it any more. */
 export type FetchBytes = (url: string, signal: AbortSignal) => Promise<Uint8Array>;
 
-/** Bytes of decoded splats that are kept; the last file is, however large. */
-const KEPT_BYTES = 128e6;
 /** Files that are fetched and decoded at a time: one is on its way while the other is decoded. */
 const FILES_AT_A_TIME = 2;
-
-/** A file that is being fetched and decoded. */
-interface Reading {
-  readonly cloud: Promise<GaussianCloud>;
-  readonly controller: AbortController;
-  /** The account that it is charged to. */
-  readonly budget: LoadBudget | undefined;
-  readers: number;
-}
 
 /**
  * Runs of splats out of the SOG files of streamed scenes. A file holds many runs: those that are asked for while it is read share one reading, and the files read last
  * are kept, up to this number of bytes.
  */
 export class SogFiles {
-  readonly #keptBytes: number;
-  /** The one used last is the last. */
-  readonly #kept = new Map<string, GaussianCloud>();
-  readonly #reading = new Map<string, Reading>();
+  readonly #reads: SharedReads<GaussianCloud>;
   readonly #gate = new Gate(FILES_AT_A_TIME);
   /** Bytes that each cloud arrived as. */
   readonly #arrived = new WeakMap<GaussianCloud, number>();
 
   /** @param keptBytes decoded splats that are kept, default 128 MB; the last file is, however large */
-  constructor(keptBytes = KEPT_BYTES) {
-    this.#keptBytes = keptBytes;
+  constructor(keptBytes?: number) {
+    this.#reads = new SharedReads(byteLengthOf, keptBytes);
   }
 
   /**
@@ -67,44 +54,12 @@ export class SogFiles {
 
   /** All splats of a file, in its order; not to be changed. Throws as {@link read} does. */
   async open(file: SogAddress, fetch: FetchBytes, signal?: AbortSignal, budget?: LoadBudget): Promise<GaussianCloud> {
-    signal?.throwIfAborted();
-    const kept = this.#kept.get(file.url);
-    if (kept) {
-      this.#keep(file.url, kept);
-      // It costs nothing more, but what is taken of it is charged.
-      budget?.arrive(this.#arrived.get(kept) ?? 0);
-      return kept;
-    }
-    let reading = this.#reading.get(file.url);
+    const isKept = this.#reads.has(file.url);
     // One that another scene reads ends by the budget of that scene.
-    if (reading === undefined || reading.budget !== budget) {
-      const controller = new AbortController();
-      const cloud = this.#read(file, fetch, controller.signal, budget);
-      reading = { cloud, controller, budget, readers: 0 };
-      this.#reading.set(file.url, reading);
-    }
-    return this.#wait(file.url, reading, signal);
-  }
-
-  /** Waits with others for a file; the last that gives up ends its reading. */
-  async #wait(url: string, reading: Reading, signal: AbortSignal | undefined): Promise<GaussianCloud> {
-    reading.readers++;
-    let giveUp: (() => void) | undefined;
-    const givenUp = new Promise<never>((_, reject) => {
-      giveUp = () => reject(signal?.reason);
-      signal?.addEventListener('abort', giveUp, { once: true });
-    });
-    try {
-      return await Promise.race([reading.cloud, givenUp]);
-    } finally {
-      signal?.removeEventListener('abort', giveUp!);
-      reading.readers--;
-      if (reading.readers === 0 && this.#reading.get(url) === reading) {
-        this.#reading.delete(url);
-        reading.controller.abort();
-        reading.cloud.catch(() => undefined);
-      }
-    }
+    const cloud = await this.#reads.read(file.url, (ended) => this.#read(file, fetch, ended, budget), signal, budget);
+    // It costs nothing more, but what is taken of it is charged.
+    if (isKept) budget?.arrive(this.#arrived.get(cloud) ?? 0);
+    return cloud;
   }
 
   async #read(
@@ -129,22 +84,9 @@ export class SogFiles {
         arrive(await fetch(partAddress(url, path).href, signal));
       const cloud = await readSogPart({ bytes, name, budget, signal }, open);
       this.#arrived.set(cloud, arrived);
-      this.#keep(url, cloud);
       return cloud;
     } finally {
       leave();
-    }
-  }
-
-  /** Keeps a file, and lets go of those that have not been used for the longest. */
-  #keep(url: string, cloud: GaussianCloud): void {
-    this.#kept.delete(url);
-    this.#kept.set(url, cloud);
-    let bytes = [...this.#kept.values()].reduce((sum, kept) => sum + byteLengthOf(kept), 0);
-    for (const [oldest, kept] of this.#kept) {
-      if (bytes <= this.#keptBytes || oldest === url) return;
-      this.#kept.delete(oldest);
-      bytes -= byteLengthOf(kept);
     }
   }
 }

@@ -1,8 +1,8 @@
 import { GaussianSplatError, loadModule, type Vector3 } from '@gaussian-splat/core';
+import { SharedReads } from '@gaussian-splat/core/fetch';
 import type * as decoder from './decode-page.js';
 import { pageLayout, type DetailManifest, type PageFormat } from './manifest.js';
 import type { CodedFile } from './page-coding.js';
-import { PageFiles } from './page-files.js';
 import { listPages, type PageList } from './page-list.js';
 import { chunkLayout, type SlotWords } from './slot-words.js';
 
@@ -64,10 +64,10 @@ export function folderSource(manifest: DetailManifest, fetchPage: FetchPage, isD
     requireBounds(file, new Float32Array(bytes, 0, (layout.chunks * bytes.byteLength) / (4 * layout.total)));
     return bytes;
   };
-  const kept = new PageFiles(fetchWhole, KEPT_BYTES);
+  const kept = new SharedReads<ArrayBuffer>(({ byteLength }) => byteLength, KEPT_BYTES);
   const fetch = async (page: number, signal: AbortSignal): Promise<SlotWords[]> => {
     const { file, first, chunks } = list.place(page);
-    const bytes = await kept.get(file.file, signal);
+    const bytes = await kept.read(file.file, (ended) => fetchWhole(file.file, ended), signal);
     signal.throwIfAborted();
     return [{ words: new Uint32Array(bytes), of: file.chunks, first, chunks }];
   };

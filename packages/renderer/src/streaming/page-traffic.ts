@@ -1,3 +1,4 @@
+import { BackOff } from '@gaussian-splat/core/fetch';
 import { NONE } from './page-list.js';
 import type { Residency } from './residency.js';
 
@@ -12,15 +13,6 @@ const RETRY_MS = 4_000;
 const MOST_TRIES = 8;
 /** Milliseconds after a failure before those are tried again that had no room beside it: of many failures once. */
 const ANEW_MS = 250;
-
-/** Of pages that have been asked for again, or may be by every look. */
-const MAY_COME = -Infinity;
-
-/** How often in a row a page has not come, and until when it is not asked for. */
-interface Failure {
-  readonly times: number;
-  readonly until: number;
-}
 
 /** A page that has come. */
 export interface FetchedPage<Words> {
@@ -49,7 +41,7 @@ export class PageTraffic<Words> {
   readonly #waiting = new Map<number, Words>();
   /** Those that wait and are wished for, the most needed last; undefined if that has to be found anew. */
   #order: number[] | undefined;
-  readonly #failures = new Map<number, Failure>();
+  readonly #failures: BackOff<number>;
   #retry: ReturnType<typeof setTimeout> | undefined;
   #anew: ReturnType<typeof setTimeout> | undefined;
   readonly #sentAt = new Map<number, number>();
@@ -63,6 +55,7 @@ export class PageTraffic<Words> {
     this.#residency = residency;
     this.#options = options;
     this.#now = options.now ?? (() => performance.now());
+    this.#failures = new BackOff({ firstMs: RETRY_MS, factor: 2, mostTries: MOST_TRIES, now: options.now });
   }
 
   /** Pages being fetched or waiting. */
@@ -99,7 +92,7 @@ export class PageTraffic<Words> {
     while (!this.#isClosed && this.#fetching.size < MOST_FETCHES && this.#slotsUnderWay < MOST_UNDER_WAY) {
       const page = this.#residency.nextMissing();
       if (page === NONE) return;
-      if (!this.#hasFailedLately(page) && this.#residency.begin(page)) void this.#bring(page);
+      if (!this.#failures.isPaused(page) && this.#residency.begin(page)) void this.#bring(page);
     }
   }
 
@@ -135,14 +128,8 @@ export class PageTraffic<Words> {
     return this.#order.pop();
   }
 
-  #hasFailedLately(page: number): boolean {
-    return this.#now() < (this.#failures.get(page)?.until ?? MAY_COME);
-  }
-
-  #noteFailure(page: number): void {
-    const times = (this.#failures.get(page)?.times ?? 0) + 1;
-    const pause = times < MOST_TRIES ? RETRY_MS * 2 ** (times - 1) : Infinity;
-    this.#failures.set(page, { times, until: this.#now() + pause });
+  #noteFailure(page: number, error: unknown): void {
+    if (this.#failures.fail(page) === 1) this.#options.onError(error);
     this.#retryLater();
     // The room that was kept for it is for others.
     this.#anew ??= setTimeout(() => {
@@ -155,16 +142,9 @@ export class PageTraffic<Words> {
   #retryLater(): void {
     this.#retry ??= setTimeout(() => {
       this.#retry = undefined;
-      let isNeeded = false;
-      for (const [page, { times, until }] of this.#failures) {
-        if (until === Infinity) continue;
-        if (this.#hasFailedLately(page)) this.#retryLater();
-        else if (until > MAY_COME) {
-          this.#failures.set(page, { times, until: MAY_COME });
-          isNeeded ||= this.#residency.need(page) > 0;
-        }
-      }
-      if (isNeeded) this.#askAnew();
+      const { due, isMore } = this.#failures.takeDue();
+      if (isMore) this.#retryLater();
+      if (due.some((page) => this.#residency.need(page) > 0)) this.#askAnew();
     }, RETRY_MS);
   }
 
@@ -202,14 +182,13 @@ export class PageTraffic<Words> {
       if (isOver()) return;
       this.#waiting.set(page, words);
       this.#order = undefined;
-      this.#failures.delete(page);
+      this.#failures.succeed(page);
     } catch (error) {
       if (isOver()) return;
       this.#slotsUnderWay -= this.#residency.slotsFor(page);
       this.#residency.giveUp(page);
       this.#sentAt.delete(page);
-      this.#noteFailure(page);
-      if (this.#failures.get(page)?.times === 1) this.#options.onError(error);
+      this.#noteFailure(page, error);
     }
     this.#fetching.delete(page);
     this.sendForMore();
