@@ -3,10 +3,11 @@ export {
   AnimationMixer,
   Box3,
   Camera,
+  CubeRenderTarget,
   DepthTexture,
   FloatType,
   HalfFloatType,
-  PMREMGenerator,
+  LinearMipmapLinearFilter,
   RenderTarget,
   Scene,
   Texture,
@@ -15,7 +16,6 @@ export {
 } from 'three/webgpu';
 export { neutralToneMapping, output, sRGBTransferOETF, vec4 } from 'three/tsl';
 export { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-export { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
 
 export const loadMeshoptDecoder = async () =>
   (await import('three/addons/libs/meshopt_decoder.module.js')).MeshoptDecoder;

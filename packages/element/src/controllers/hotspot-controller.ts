@@ -2,18 +2,23 @@ import type { Camera } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import { css, type ReactiveController, type ReactiveControllerHost } from 'lit';
 import { parsePoint } from '../camera/grammar.js';
-import { toScene } from '../camera/orbit.js';
-import { project } from '../camera/projection.js';
 import { ScenePoint } from '../camera/values.js';
 import { adoptStyles } from '../styles.js';
 import type { CameraController } from './camera-controller.js';
+import { LabelBox, LabelView, type Located } from './label-box.js';
 import { labelParts } from './label-parts.js';
+import { windowOf } from './size-controller.js';
 
 const STYLES = css`
   .hotspot {
     position: absolute;
     top: 0;
     left: 0;
+  }
+  /* Apart from the box that moves: style of what has transitions takes three times as long to recalculate. */
+  .hotspot > div {
+    /* Else a label that fades is laid out anew. */
+    isolation: isolate;
     opacity: var(--max-hotspot-opacity, 1);
     transition: opacity 0.3s;
   }
@@ -23,17 +28,17 @@ const STYLES = css`
   .hotspot ::slotted(*) {
     pointer-events: auto;
   }
-  .hotspot.hidden {
+  .hotspot.hidden > div {
     opacity: var(--min-hotspot-opacity, 0.25);
   }
   .hotspot.hidden:not(.with-panel) ::slotted(*) {
     pointer-events: none;
   }
-  .hotspot.hidden:focus-within {
+  .hotspot.hidden > :focus-within {
     opacity: var(--max-hotspot-opacity, 1);
   }
   @media (prefers-reduced-motion: reduce) {
-    .hotspot {
+    .hotspot > div {
       transition: none;
     }
   }
@@ -62,25 +67,23 @@ export interface HotspotPlace {
   readonly visible: boolean;
 }
 
-type Point = readonly [x: number, y: number, z: number];
-
-interface Hotspot {
+interface Hotspot extends Located {
   readonly elements: readonly HTMLElement[];
-  readonly position: Point | null;
-  readonly normal: Point | null;
-  x: number;
-  y: number;
-  depth: number;
-  facesCamera: boolean;
   isOccluded: boolean;
   isVisible: boolean;
+  /** One of its elements holds an open panel. */
+  hasPanel: boolean;
 }
 
 const PREFIX = 'hotspot-';
+/** A panel of a label may have been opened or closed. */
+const PANEL_EVENTS = ['toggle', 'fullscreenchange'];
 /** Less light than this from a hotspot, and scenery hides it. */
 const HIDDEN_BELOW = 0.5;
 /** A label on a surface is in front of it by this share of the scene's size: splats are thick. */
 const IN_FRONT = 0.03;
+/** A label moves when its point has moved by this many device pixels: less is not seen, and each write costs a recalculation of style. */
+const VISIBLE_MOVE = 0.5;
 /** Least time between two looks at what hides them while the camera moves, ms. */
 const PROBE_INTERVAL_MS = 100;
 
@@ -91,6 +94,8 @@ export class HotspotController implements ReactiveController {
   #hotspots = new Map<string, Hotspot>();
   #observer: MutationObserver | undefined;
   #camera: Camera | undefined;
+  /** Boxes of the labels, by their elements. */
+  readonly #boxes = new WeakMap<Element, LabelBox>();
   /** What each label was told last. */
   readonly #told = new WeakMap<HTMLElement, boolean>();
   #isProbing = false;
@@ -109,11 +114,11 @@ export class HotspotController implements ReactiveController {
   }
 
   hostConnected(): void {
-    this.#observer = new MutationObserver(() => this.#collect());
-    const attributeFilter = ['slot', 'data-position', 'data-normal', 'data-orbit'];
+    this.#observer = new MutationObserver((records) => this.#onMutations(records));
+    const attributeFilter = ['slot', 'data-position', 'data-normal', 'data-orbit', 'open'];
     this.#observer.observe(this.#host, { childList: true, subtree: true, attributeFilter });
-    // Such events do not bubble.
-    this.#host.addEventListener('toggle', this.#onToggle, true);
+    // `toggle` does not bubble.
+    for (const type of PANEL_EVENTS) this.#host.addEventListener(type, this.#findPanels, true);
     this.#collect();
   }
 
@@ -123,11 +128,20 @@ export class HotspotController implements ReactiveController {
 
   hostDisconnected(): void {
     this.#observer?.disconnect();
-    this.#host.removeEventListener('toggle', this.#onToggle, true);
+    for (const type of PANEL_EVENTS) this.#host.removeEventListener(type, this.#findPanels, true);
   }
 
-  /** A panel was opened or closed. */
-  readonly #onToggle = (): void => this.#place();
+  #onMutations(records: readonly MutationRecord[]): void {
+    if (records.some(({ attributeName }) => attributeName !== 'open')) this.#collect();
+    else this.#findPanels();
+  }
+
+  /** Labels that hold an open panel: asked when one opens or closes, since a query for each label of each frame takes as long as the frame. */
+  readonly #findPanels = (): void => {
+    for (const hotspot of this.#hotspots.values())
+      hotspot.hasPanel = hotspot.elements.some((element) => element.querySelector(labelParts.panel) !== null);
+    this.#place();
+  };
 
   /** A frame was drawn from this camera. */
   frameDrawn(camera: Camera): void {
@@ -173,7 +187,7 @@ export class HotspotController implements ReactiveController {
 
   #read(elements: readonly HTMLElement[], before: Hotspot | undefined): Hotspot {
     const [{ dataset, slot }] = elements;
-    const read = (name: string, text: string | undefined): Point | null => {
+    const read = (name: string, text: string | undefined): Located['position'] => {
       const point = text === undefined ? null : parsePoint(text);
       if (text !== undefined && point === null)
         this.#of.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in metres, found "${text.slice(0, 200)}".`);
@@ -182,54 +196,42 @@ export class HotspotController implements ReactiveController {
     const position = read('data-position', dataset.position);
     const normal = read('data-normal', dataset.normal);
     const fresh = { x: 0, y: 0, depth: 0, facesCamera: true, isOccluded: false, isVisible: false };
-    return { ...fresh, ...before, elements, position, normal };
+    const hasPanel = elements.some((element) => element.querySelector(labelParts.panel) !== null);
+    return { ...fresh, ...before, elements, position, normal, hasPanel };
   }
 
   /** Moves the boxes to where the last frame has their points, and hides those that are in no frame. */
   #place(): void {
     const boxes = this.#of.hotspotLayer?.children;
-    // Read once, before anything is written: each reading after a change of style would be another layout.
+    if (boxes === undefined) return;
+    // All reads come before all writes: each read after a write would be another layout.
     const { clientWidth: width, clientHeight: height } = this.#host;
-    [...this.#hotspots.values()].forEach((hotspot, i) => {
-      const box = boxes?.[i] as HTMLElement | undefined;
-      if (box === undefined) return;
-      this.#locate(hotspot, width, height);
-      const isPlaced = hotspot.depth > 0;
-      box.classList.toggle('placed', isPlaced);
-      if (isPlaced) box.style.transform = `translate(${hotspot.x}px, ${hotspot.y}px) translate(-50%, -50%)`;
-      this.#show(hotspot, box, width, height);
-    });
+    const leastMove = VISIBLE_MOVE / windowOf(this.#host).devicePixelRatio || 0;
+    const view = this.#camera && new LabelView(this.#camera, this.#of.camera.viewerFrame, width, height);
+    let i = 0;
+    for (const hotspot of this.#hotspots.values()) {
+      const element = boxes[i++] as HTMLElement | undefined;
+      if (element === undefined) continue;
+      hotspot.depth = 0;
+      view?.locate(hotspot);
+      const { x, y, depth, facesCamera, isOccluded, hasPanel } = hotspot;
+      const isOpen = depth > 0 && facesCamera && !isOccluded;
+      const box = this.#boxOf(element);
+      if (depth > 0) box.moveTo(hotspot, leastMove);
+      else box.remove();
+      // Of a label whose point has left the frame a part may still be there to read.
+      box.show(isOpen, hasPanel);
+      this.#tell(hotspot, isOpen && x >= 0 && y >= 0 && x <= width && y <= height);
+    }
   }
 
-  #locate(hotspot: Hotspot, width: number, height: number): void {
-    const camera = this.#camera;
-    hotspot.depth = 0;
-    if (camera === undefined || hotspot.position === null) return;
-    const { x, y, depth } = project(camera, toScene(this.#of.camera.viewerFrame, hotspot.position));
-    hotspot.x = (x * width) / camera.width;
-    hotspot.y = (y * height) / camera.height;
-    hotspot.depth = depth > camera.near ? depth : 0;
-    hotspot.facesCamera = this.#facesCamera(hotspot, camera);
+  #boxOf(element: HTMLElement): LabelBox {
+    let box = this.#boxes.get(element);
+    if (box === undefined) this.#boxes.set(element, (box = new LabelBox(element)));
+    return box;
   }
 
-  #facesCamera({ position, normal }: Hotspot, { worldToCamera: m }: Camera): boolean {
-    if (normal === null || position === null) return true;
-    const frame = this.#of.camera.viewerFrame;
-    const [n, p] = [toScene(frame, normal), toScene(frame, position)];
-    // In the camera's axes the eye is at 0, so the way from the eye to the point is the point itself.
-    const row = (r: number, v: Point, w: number): number =>
-      m[4 * r] * v[0] + m[4 * r + 1] * v[1] + m[4 * r + 2] * v[2] + w * m[4 * r + 3];
-    return [0, 1, 2].reduce((sum, r) => sum + row(r, n, 0) * row(r, p, 1), 0) < 0;
-  }
-
-  #show(hotspot: Hotspot, box: HTMLElement, width: number, height: number): void {
-    const { x, y } = hotspot;
-    const isOpen = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
-    // Of a label whose point has left the frame a part may still be there to read.
-    box.classList.toggle('hidden', !isOpen);
-    const holdsPanel = !isOpen && hotspot.elements.some((element) => element.querySelector(labelParts.panel) !== null);
-    box.classList.toggle('with-panel', holdsPanel);
-    const isVisible = isOpen && x >= 0 && y >= 0 && x <= width && y <= height;
+  #tell(hotspot: Hotspot, isVisible: boolean): void {
     hotspot.isVisible = isVisible;
     for (const element of hotspot.elements) {
       if (this.#told.get(element) === isVisible) continue;

@@ -6,12 +6,11 @@ import {
   DepthTexture,
   FloatType,
   HalfFloatType,
-  PMREMGenerator,
   RenderTarget,
-  RoomEnvironment,
   Scene,
   WebGPUCoordinateSystem,
   WebGPURenderer,
+  type CubeRenderTarget,
   type Group,
 } from './three.js';
 import type { ViewerFrame } from '../camera/orbit.js';
@@ -19,6 +18,7 @@ import type { Frame } from '../live/frame-filter.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
 import type { PlacedModel } from './meshes.js';
 import type { Model } from './model.js';
+import { makeEnvironment } from './environment.js';
 import { MeshResolve } from './mesh-resolve.js';
 import { light, showAsDisplayed, showThrough } from './shown-colors.js';
 
@@ -48,12 +48,13 @@ export class MeshLayer {
   /** Near plane of the last frame. */
   #near = 1;
   readonly #shown = new Map<Model, Group>();
-  #environment: RenderTarget | undefined;
+  readonly #environment: CubeRenderTarget;
   #size = '1 x 1';
 
-  private constructor(device: GPUDevice, renderer: WebGPURenderer) {
+  private constructor(device: GPUDevice, renderer: WebGPURenderer, environment: CubeRenderTarget) {
     this.device = device;
     this.#renderer = renderer;
+    this.#environment = environment;
     this.#resolve = new MeshResolve(device);
     this.#target.depthTexture = new DepthTexture(1, 1, FloatType);
     this.#glass.depthTexture = this.#target.depthTexture;
@@ -75,7 +76,7 @@ export class MeshLayer {
     await renderer.init();
     device.onuncapturederror = onuncapturederror;
     renderer.setClearColor(0, 0);
-    return new MeshLayer(device, renderer);
+    return new MeshLayer(device, renderer, await makeEnvironment(device, renderer));
   }
 
   /** Compiles what a model is drawn with, a few milliseconds of the page's thread at a time, and on the GPU without holding up other work. */
@@ -138,7 +139,7 @@ export class MeshLayer {
 
   destroy(): void {
     for (const group of this.#shown.values()) this.#scene.remove(group);
-    this.#environment?.dispose();
+    this.#environment.dispose();
     this.#target.depthTexture?.dispose();
     this.#target.dispose();
     this.#glass.dispose();
@@ -193,18 +194,7 @@ export class MeshLayer {
       }
     });
     if (model.hasLights) return;
-    const { texture } = (this.#environment ??= this.#makeEnvironment());
-    for (const material of model.materials) light(material, texture);
-  }
-
-  /** Even light from all around: the room of model-viewer. */
-  #makeEnvironment(): RenderTarget {
-    const generator = new PMREMGenerator(this.#renderer);
-    const room = new RoomEnvironment();
-    const environment = generator.fromScene(room, 0.04, 0.1, 100, { size: 128 });
-    room.dispose();
-    generator.dispose();
-    return environment;
+    for (const material of model.materials) light(material, this.#environment.texture);
   }
 
   #look({ width, height, fx, fy, cx, cy, near, worldToCamera }: Camera, world: ViewerFrame): void {

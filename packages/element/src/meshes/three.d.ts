@@ -62,6 +62,16 @@ export class RenderTarget {
   setSize(width: number, height: number): void;
   dispose(): void;
 }
+/** The prefiltered light of all directions, of which three.js reads a level by the roughness of a material. */
+export interface CubeTexture extends Texture {
+  readonly mipmaps: { readonly width: number; readonly height: number }[];
+  isPMREMTexture: boolean;
+}
+export class CubeRenderTarget {
+  texture: CubeTexture;
+  constructor(size: number, options: object);
+  dispose(): void;
+}
 /** A value of a shader. */
 export interface ShaderNode {
   readonly rgb: ShaderNode;
@@ -113,22 +123,12 @@ export class AnimationMixer {
   stopAllAction(): void;
   uncacheRoot(root: Object3D): void;
 }
-export class PMREMGenerator {
-  constructor(renderer: WebGPURenderer);
-  fromScene(
-    scene: Scene,
-    sigma?: number,
-    near?: number,
-    far?: number,
-    options?: { readonly size?: number },
-  ): RenderTarget;
-  dispose(): void;
-}
 export class WebGPURenderer {
   constructor(options: object);
   readonly backend: { get(object: object): { readonly texture?: GPUTexture } };
   init(): Promise<unknown>;
   setRenderTarget(target: RenderTarget | null): void;
+  initRenderTarget(target: CubeRenderTarget): void;
   setClearColor(color: number, alpha: number): void;
   autoClearDepth: boolean;
   render(scene: Scene, camera: Camera): void;
@@ -139,6 +139,7 @@ export class WebGPURenderer {
 }
 export const FloatType: number;
 export const HalfFloatType: number;
+export const LinearMipmapLinearFilter: number;
 export const WebGPUCoordinateSystem: number;
 
 export interface GLTFParser {
@@ -167,7 +168,3 @@ export interface MeshoptDecoder {
   ): Promise<Uint8Array<ArrayBuffer>>;
 }
 export const loadMeshoptDecoder: () => Promise<MeshoptDecoder>;
-
-export class RoomEnvironment extends Scene {
-  dispose(): void;
-}

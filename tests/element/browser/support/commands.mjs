@@ -30,6 +30,13 @@ const ACTIONS = {
     return (await devtools(page, 'Runtime.getHeapUsage')).usedSize;
   },
 
+  /** Counters and seconds of the page's thread since it was opened: `ScriptDuration`, `RecalcStyleDuration`, `RecalcStyleCount`, `LayoutCount` and the others of DevTools. */
+  'thread-metrics': async (page) => {
+    await devtools(page, 'Performance.enable', { timeDomain: 'threadTicks' });
+    const { metrics } = await devtools(page, 'Performance.getMetrics');
+    return Object.fromEntries(metrics.map(({ name, value }) => [name, value]));
+  },
+
   /** Ends the browser's GPU process as a crash would. */
   'kill-gpu-process': async (page) => {
     const browser = await page.context().browser().newBrowserCDPSession();

@@ -1,0 +1,99 @@
+import type { Camera } from '@gaussian-splat/core';
+import type { ViewerFrame } from '../camera/orbit.js';
+
+type Point = readonly [x: number, y: number, z: number];
+
+/** A point of viewer space, and what a frame makes of it. */
+export interface Located {
+  readonly position: Point | null;
+  /** Direction away from the surface of the label; null for a label that faces every camera. */
+  readonly normal: Point | null;
+  /** CSS pixels from the left and the top edge of the element. */
+  x: number;
+  y: number;
+  /** World units along the camera's axis; 0 for what is in front of the near plane, or nowhere. */
+  depth: number;
+  facesCamera: boolean;
+}
+
+/** The camera of a frame for points of viewer space: one matrix for all labels of the frame. */
+export class LabelView {
+  readonly #camera: Camera;
+  /** From viewer space to the camera's axes: 3 rows of 4. */
+  readonly #matrix: readonly number[];
+  readonly #scaleX: number;
+  readonly #scaleY: number;
+
+  /**
+   * @param width of the element, CSS pixels
+   * @param height of the element, CSS pixels
+   */
+  constructor(camera: Camera, frame: ViewerFrame, width: number, height: number) {
+    const m = camera.worldToCamera;
+    this.#camera = camera;
+    this.#matrix = [0, 4, 8].flatMap((row) => [
+      ...frame.map(([x, y, z]) => m[row] * x + m[row + 1] * y + m[row + 2] * z),
+      m[row + 3],
+    ]);
+    this.#scaleX = width / camera.width;
+    this.#scaleY = height / camera.height;
+  }
+
+  /** Writes where a label lies. */
+  locate(label: Located): void {
+    const { position, normal } = label;
+    label.depth = 0;
+    if (position === null) return;
+    const { fx, fy, cx, cy, near } = this.#camera;
+    const [x, y, z] = [this.#along(0, position, 1), this.#along(4, position, 1), this.#along(8, position, 1)];
+    label.x = ((fx * x) / z + cx) * this.#scaleX;
+    label.y = ((fy * y) / z + cy) * this.#scaleY;
+    label.depth = z > near ? z : 0;
+    label.facesCamera = normal === null || this.#toward(normal, x, y, z) < 0;
+  }
+
+  /** The eye is the origin of the camera's axes: the direction from the eye to a point is the point itself. */
+  #toward(normal: Point, x: number, y: number, z: number): number {
+    return this.#along(0, normal, 0) * x + this.#along(4, normal, 0) * y + this.#along(8, normal, 0) * z;
+  }
+
+  #along(row: number, [x, y, z]: Point, w: number): number {
+    const m = this.#matrix;
+    return m[row] * x + m[row + 1] * y + m[row + 2] * z + m[row + 3] * w;
+  }
+}
+
+/** The box of a label in the element's shadow tree. It is written only when what is seen changes: each write is a recalculation of its style. */
+export class LabelBox {
+  readonly #element: HTMLElement;
+  #x = NaN;
+  #y = NaN;
+  #classes = '';
+  #isPlaced = false;
+
+  constructor(element: HTMLElement) {
+    this.#element = element;
+  }
+
+  /** @param least distance that is seen, CSS pixels */
+  moveTo({ x, y }: Located, least: number): void {
+    this.#isPlaced = true;
+    if (Math.abs(x - this.#x) < least && Math.abs(y - this.#y) < least) return;
+    this.#x = x;
+    this.#y = y;
+    this.#element.style.transform = `translate(${x.toFixed(2)}px, ${y.toFixed(2)}px) translate(-50%, -50%)`;
+  }
+
+  /** The label is in no frame. */
+  remove(): void {
+    this.#isPlaced = false;
+  }
+
+  /** @param holdsPanel a hidden label with an open panel can still be used */
+  show(isOpen: boolean, holdsPanel: boolean): void {
+    const classes = `hotspot${this.#isPlaced ? ' placed' : ''}${isOpen ? '' : holdsPanel ? ' hidden with-panel' : ' hidden'}`;
+    if (classes === this.#classes) return;
+    this.#classes = classes;
+    this.#element.className = classes;
+  }
+}

@@ -1,0 +1,213 @@
+/** The light around meshes: the room of model-viewer and of three.js's `RoomEnvironment`, prefiltered for each roughness as three.js's `PMREMGenerator` has it. */
+import { CubeRenderTarget, HalfFloatType, LinearMipmapLinearFilter, type WebGPURenderer } from './three.js';
+
+/** Pixels of a side of a face, for mirrors; each level of more roughness has half of them. Lights are blurred by {@link SHADER}'s SIGMA, so more are not seen. */
+const SIZE = 128;
+/** The last one has faces of 8 x 8. */
+const LEVELS = 5;
+/** Invocations of a workgroup along each side. */
+const GROUP = 8;
+
+/**
+ * Rays into boxes in place of three.js's drawing of them: its shaders are assembled from nodes on the page's thread, which takes a third of a second, and 256 samples for each of
+ * 65,536 pixels of a face keep a slow GPU for as long.
+ */
+const SHADER = /* wgsl */ `
+const SIZE = ${SIZE}.0;
+const LAST = ${LEVELS - 1}.0;
+const PI = 3.14159265;
+const GOLDEN_ANGLE = 2.39996323;
+// Of the Gaussian that blurs the room, radians.
+const SIGMA = 0.04;
+const RAYS = 32u;
+
+// half: of its sides. turn: around y, radians. emitted: radiance, 0 for the white boxes.
+struct Box { center: vec3f, turn: f32, half: vec3f, emitted: f32 }
+
+const ROOM = Box(vec3f(-0.757, 9.719, 0.717), 0.0, vec3f(15.8565, 14.1525, 14.2955), 0.0);
+const LAMP = vec3f(0.418, 12.699, 0.3);
+const LAMP_INTENSITY = 900.0;
+const LAMP_REACH = 28.0;
+const BOXES = array<Box, 12>(
+  Box(vec3f(-10.906, -1.491, 1.846), -0.195, vec3f(1.164, 3.9525, 2.3255), 0.0),
+  Box(vec3f(-5.607, -4.254, -0.758), 0.994, vec3f(0.985, 0.767, 1.9775), 0.0),
+  Box(vec3f(6.167, -2.643, 7.803), 0.561, vec3f(1.9635, 3.1425, 1.8435), 0.0),
+  Box(vec3f(-2.017, -3.482, 6.124), 0.333, vec3f(1.001, 2.283, 1.032), 0.0),
+  Box(vec3f(2.291, -4.256, -2.621), -0.286, vec3f(0.773, 0.776, 0.748), 0.0),
+  Box(vec3f(-2.193, -3.869, -5.547), 0.516, vec3f(1.9375, 1.7435, 1.493), 0.0),
+  Box(vec3f(-16.116, 10.87, 8.208), 0.0, vec3f(0.05, 1.214, 1.3695), 50.0),
+  Box(vec3f(-16.109, 14.521, -8.207), 0.0, vec3f(0.05, 1.2125, 1.3755), 50.0),
+  Box(vec3f(14.904, 8.698, -1.832), 0.0, vec3f(0.075, 2.1325, 3.1655), 17.0),
+  Box(vec3f(-0.462, 5.39, 14.52), 0.0, vec3f(2.19, 2.7205, 0.044), 43.0),
+  Box(vec3f(3.235, 7.986, -12.541), 0.0, vec3f(1.25, 1.0, 0.05), 20.0),
+  Box(vec3f(0.0, 16.5, 0.0), 0.0, vec3f(0.5, 0.05, 0.5), 100.0));
+
+@group(0) @binding(0) var level: texture_storage_2d_array<rgba16float, write>;
+@group(0) @binding(1) var sharper: texture_cube<f32>;
+@group(0) @binding(2) var linear: sampler;
+
+
+// Around y.
+fn turned(v: vec3f, angle: f32) -> vec3f {
+  let c = cos(angle);
+  let s = sin(angle);
+  return vec3f(c * v.x + s * v.z, v.y, c * v.z - s * v.x);
+}
+
+// Light of the lamp that a white, rough, dielectric surface sends toward the origin.
+fn lit(point: vec3f, normal: vec3f) -> f32 {
+  let way = LAMP - point;
+  let distance = length(way);
+  let toLamp = way / distance;
+  let toEye = -normalize(point);
+  let cosLamp = saturate(dot(normal, toLamp));
+  let cosEye = saturate(dot(normal, toEye));
+  let window = saturate(1.0 - pow(distance / LAMP_REACH, 4.0));
+  let irradiance = cosLamp * LAMP_INTENSITY * window * window / (distance * distance);
+  let fresnel = 0.04 + 0.96 * pow(1.0 - saturate(dot(toEye, normalize(toEye + toLamp))), 5.0);
+  // GGX of roughness 1.
+  let specular = fresnel * 0.5 / max(cosLamp + cosEye, 1e-6) / PI;
+  return irradiance * ((1.0 - fresnel) / PI + specular);
+}
+
+// Radiance that reaches the origin from a direction: all of the room is gray.
+fn radiance(direction: vec3f) -> f32 {
+  let exits = (ROOM.center + sign(direction) * ROOM.half) / direction;
+  var nearest = min(exits.x, min(exits.y, exits.z));
+  var normal = -sign(direction) * step(exits, vec3f(nearest));
+  var emitted = 0.0;
+  for (var i = 0u; i < 12u; i++) {
+    let box = BOXES[i];
+    let ray = turned(direction, -box.turn);
+    let center = turned(box.center, -box.turn);
+    let enters = (center - sign(ray) * box.half) / ray;
+    let leaves = (center + sign(ray) * box.half) / ray;
+    let enter = max(enters.x, max(enters.y, enters.z));
+    if (enter > 0.0 && enter < nearest && enter < min(leaves.x, min(leaves.y, leaves.z))) {
+      nearest = enter;
+      normal = turned(-sign(ray) * step(vec3f(enter), enters), box.turn);
+      emitted = box.emitted;
+    }
+  }
+  return select(lit(nearest * direction, normal), emitted, emitted > 0.0);
+}
+
+// Of a pixel of a face, as WebGPU samples cubes.
+fn directionOf(id: vec3u, size: f32) -> vec3f {
+  let s = 2.0 * (f32(id.x) + 0.5) / size - 1.0;
+  let t = 2.0 * (f32(id.y) + 0.5) / size - 1.0;
+  let faces = array<vec3f, 6>(
+    vec3f(1.0, -t, -s), vec3f(-1.0, -t, s), vec3f(s, 1.0, t), vec3f(s, -1.0, -t), vec3f(s, -t, 1.0), vec3f(-s, -t, -1.0));
+  return normalize(faces[id.z]);
+}
+
+// The direction of a spherical angle from another.
+fn around(axis: vec3f, cosTheta: f32, phi: f32) -> vec3f {
+  let up = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 0.0, 1.0), abs(axis.z) < 0.999);
+  let tangent = normalize(cross(up, axis));
+  let sinTheta = sqrt(max(0.0, 1.0 - cosTheta * cosTheta));
+  return cosTheta * axis + sinTheta * (cos(phi) * tangent + sin(phi) * cross(axis, tangent));
+}
+
+@compute @workgroup_size(${GROUP}, ${GROUP})
+fn mirror(@builtin(global_invocation_id) id: vec3u) {
+  let direction = directionOf(id, SIZE);
+  var sum = 0.0;
+  for (var i = 0u; i < RAYS; i++) {
+    let theta = SIGMA * sqrt(-2.0 * log(1.0 - (f32(i) + 0.5) / f32(RAYS)));
+    // three.js samples cubes with x turned around.
+    sum += radiance(around(direction, cos(theta), f32(i) * GOLDEN_ANGLE) * vec3f(-1.0, 1.0, 1.0));
+  }
+  textureStore(level, id.xy, id.z, vec4f(vec3f(sum / f32(RAYS)), 1.0));
+}
+
+// GGX's alpha, the square of the roughness, of a level.
+fn alphaOf(lod: f32) -> f32 {
+  let roughness = 1.0 - sqrt(1.0 - lod / LAST);
+  return roughness * roughness;
+}
+
+// A level is the one before it, filtered by as much as it lacks: normals that face the eye, as PMREMGenerator has it.
+@compute @workgroup_size(${GROUP}, ${GROUP})
+fn rougher(@builtin(global_invocation_id) id: vec3u) {
+  let size = f32(textureDimensions(level).x);
+  let lod = log2(SIZE / size);
+  let before = alphaOf(lod - 1.0);
+  let alpha2 = alphaOf(lod) * alphaOf(lod) - before * before;
+  let direction = directionOf(id, size);
+  let samples = u32(32.0 * exp2(lod - 1.0));
+  var sum = 0.0;
+  var weights = 0.0;
+  for (var i = 0u; i < samples; i++) {
+    let u = (f32(i) + 0.5) / f32(samples);
+    // Of the reflected ray, sampled by visible normals (Heitz 2018).
+    let cosTheta = (1.0 - u - alpha2 * u) / (1.0 - u + alpha2 * u);
+    if (cosTheta <= 0.0) { continue; }
+    sum += cosTheta * textureSampleLevel(sharper, linear, around(direction, cosTheta, f32(i) * GOLDEN_ANGLE), 0.0).r;
+    weights += cosTheta;
+  }
+  textureStore(level, id.xy, id.z, vec4f(vec3f(sum / weights), 1.0));
+}
+`;
+
+/** Fulfils with the light, prefiltered on the GPU; its texture is the environment of three.js's materials. */
+export async function makeEnvironment(device: GPUDevice, renderer: WebGPURenderer): Promise<CubeRenderTarget> {
+  const label = 'gs.mesh_environment';
+  const module = device.createShaderModule({ label, code: SHADER });
+  const made = ['mirror', 'rougher'].map((entryPoint) =>
+    device.createComputePipelineAsync({ label, layout: 'auto', compute: { module, entryPoint } }),
+  );
+  const [mirror, rougher] = await Promise.all(made);
+  const { STORAGE_BINDING, TEXTURE_BINDING, COPY_SRC } = GPUTextureUsage;
+  const cube = device.createTexture({
+    label,
+    size: [SIZE, SIZE, 6],
+    format: 'rgba16float',
+    mipLevelCount: LEVELS,
+    usage: STORAGE_BINDING | TEXTURE_BINDING | COPY_SRC,
+  });
+  const view = (baseMipLevel: number, dimension: GPUTextureViewDimension): GPUTextureView =>
+    cube.createView({ dimension, baseMipLevel, mipLevelCount: 1 });
+  const linear = device.createSampler({ label, magFilter: 'linear', minFilter: 'linear' });
+  const encoder = device.createCommandEncoder({ label });
+  const target = targetOf(renderer);
+  for (let level = 0; level < LEVELS; level++) {
+    const pipeline = level === 0 ? mirror : rougher;
+    const resources = [view(level, '2d-array'), ...(level === 0 ? [] : [view(level - 1, 'cube'), linear])];
+    const pass = encoder.beginComputePass({ label });
+    pass.setPipeline(pipeline);
+    pass.setBindGroup(
+      0,
+      device.createBindGroup({
+        label,
+        layout: pipeline.getBindGroupLayout(0),
+        entries: resources.map((resource, binding) => ({ binding, resource })),
+      }),
+    );
+    const groups = (SIZE >> level) / GROUP;
+    pass.dispatchWorkgroups(groups, groups, 6);
+    pass.end();
+    const texture = renderer.backend.get(target.texture).texture!;
+    const size = [SIZE >> level, SIZE >> level, 6];
+    encoder.copyTextureToTexture({ texture: cube, mipLevel: level }, { texture, mipLevel: level }, size);
+  }
+  device.queue.submit([encoder.finish()]);
+  cube.destroy();
+  return target;
+}
+
+/** A cube of three.js's with its levels, on the GPU. */
+function targetOf(renderer: WebGPURenderer): CubeRenderTarget {
+  const target = new CubeRenderTarget(SIZE, {
+    type: HalfFloatType,
+    minFilter: LinearMipmapLinearFilter,
+    generateMipmaps: false,
+    depthBuffer: false,
+  });
+  const { texture } = target;
+  for (let level = 0; level < LEVELS; level++)
+    texture.mipmaps.push({ width: SIZE >> level, height: SIZE >> level });
+  texture.isPMREMTexture = true;
+  renderer.initRenderTarget(target);
+  return target;
+}
