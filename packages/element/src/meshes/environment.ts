@@ -5,53 +5,54 @@ import { CubeRenderTarget, HalfFloatType, LinearMipmapLinearFilter, type WebGPUR
 const SIZE = 128;
 /** The last one has faces of 8 x 8. */
 const LEVELS = 5;
+/** The least sharp level that others are made of. */
+const SHARPER = 2;
 /** Invocations of a workgroup along each side. */
 const GROUP = 8;
 
 /**
- * Rays into boxes in place of three.js's drawing of them: its shaders are assembled from nodes on the page's thread, which takes a third of a second, and 256 samples for each of
- * 65,536 pixels of a face keep a slow GPU for as long.
+ * Rays into boxes, in place of a scene that three.js draws: it assembles the shaders of six materials on the page's thread, which takes a quarter of a second, and filters faces of 256
+ * pixels in 256 samples each, which a processor that draws takes seconds for.
  */
 const SHADER = /* wgsl */ `
 const SIZE = ${SIZE}.0;
 const LAST = ${LEVELS - 1}.0;
+// Rougher ones are made of this level: two wide lobes in turn are wider than their squares say.
+const SHARPER = ${SHARPER}.0;
 const PI = 3.14159265;
 const GOLDEN_ANGLE = 2.39996323;
 // Of the Gaussian that blurs the room, radians.
 const SIGMA = 0.04;
-const RAYS = 32u;
+const RAYS = 24u;
 
-// half: of its sides. turn: around y, radians. emitted: radiance, 0 for the white boxes.
-struct Box { center: vec3f, turn: f32, half: vec3f, emitted: f32 }
+// half: of its sides. turn: around y, cosine and sine. emitted: radiance, 0 for the white boxes.
+struct Box { center: vec3f, half: vec3f, turn: vec2f, emitted: f32 }
+const STRAIGHT = vec2f(1.0, 0.0);
 
-const ROOM = Box(vec3f(-0.757, 9.719, 0.717), 0.0, vec3f(15.8565, 14.1525, 14.2955), 0.0);
+const ROOM = Box(vec3f(-0.757, 9.719, 0.717), vec3f(15.8565, 14.1525, 14.2955), STRAIGHT, 0.0);
 const LAMP = vec3f(0.418, 12.699, 0.3);
 const LAMP_INTENSITY = 900.0;
 const LAMP_REACH = 28.0;
 const BOXES = array<Box, 12>(
-  Box(vec3f(-10.906, -1.491, 1.846), -0.195, vec3f(1.164, 3.9525, 2.3255), 0.0),
-  Box(vec3f(-5.607, -4.254, -0.758), 0.994, vec3f(0.985, 0.767, 1.9775), 0.0),
-  Box(vec3f(6.167, -2.643, 7.803), 0.561, vec3f(1.9635, 3.1425, 1.8435), 0.0),
-  Box(vec3f(-2.017, -3.482, 6.124), 0.333, vec3f(1.001, 2.283, 1.032), 0.0),
-  Box(vec3f(2.291, -4.256, -2.621), -0.286, vec3f(0.773, 0.776, 0.748), 0.0),
-  Box(vec3f(-2.193, -3.869, -5.547), 0.516, vec3f(1.9375, 1.7435, 1.493), 0.0),
-  Box(vec3f(-16.116, 10.87, 8.208), 0.0, vec3f(0.05, 1.214, 1.3695), 50.0),
-  Box(vec3f(-16.109, 14.521, -8.207), 0.0, vec3f(0.05, 1.2125, 1.3755), 50.0),
-  Box(vec3f(14.904, 8.698, -1.832), 0.0, vec3f(0.075, 2.1325, 3.1655), 17.0),
-  Box(vec3f(-0.462, 5.39, 14.52), 0.0, vec3f(2.19, 2.7205, 0.044), 43.0),
-  Box(vec3f(3.235, 7.986, -12.541), 0.0, vec3f(1.25, 1.0, 0.05), 20.0),
-  Box(vec3f(0.0, 16.5, 0.0), 0.0, vec3f(0.5, 0.05, 0.5), 100.0));
+  Box(vec3f(-10.906, -1.491, 1.846), vec3f(1.164, 3.9525, 2.3255), vec2f(cos(-0.195), sin(-0.195)), 0.0),
+  Box(vec3f(-5.607, -4.254, -0.758), vec3f(0.985, 0.767, 1.9775), vec2f(cos(0.994), sin(0.994)), 0.0),
+  Box(vec3f(6.167, -2.643, 7.803), vec3f(1.9635, 3.1425, 1.8435), vec2f(cos(0.561), sin(0.561)), 0.0),
+  Box(vec3f(-2.017, -3.482, 6.124), vec3f(1.001, 2.283, 1.032), vec2f(cos(0.333), sin(0.333)), 0.0),
+  Box(vec3f(2.291, -4.256, -2.621), vec3f(0.773, 0.776, 0.748), vec2f(cos(-0.286), sin(-0.286)), 0.0),
+  Box(vec3f(-2.193, -3.869, -5.547), vec3f(1.9375, 1.7435, 1.493), vec2f(cos(0.516), sin(0.516)), 0.0),
+  Box(vec3f(-16.116, 10.87, 8.208), vec3f(0.05, 1.214, 1.3695), STRAIGHT, 50.0),
+  Box(vec3f(-16.109, 14.521, -8.207), vec3f(0.05, 1.2125, 1.3755), STRAIGHT, 50.0),
+  Box(vec3f(14.904, 8.698, -1.832), vec3f(0.075, 2.1325, 3.1655), STRAIGHT, 17.0),
+  Box(vec3f(-0.462, 5.39, 14.52), vec3f(2.19, 2.7205, 0.044), STRAIGHT, 43.0),
+  Box(vec3f(3.235, 7.986, -12.541), vec3f(1.25, 1.0, 0.05), STRAIGHT, 20.0),
+  Box(vec3f(0.0, 16.5, 0.0), vec3f(0.5, 0.05, 0.5), STRAIGHT, 100.0));
 
 @group(0) @binding(0) var level: texture_storage_2d_array<rgba16float, write>;
 @group(0) @binding(1) var sharper: texture_cube<f32>;
 @group(0) @binding(2) var linear: sampler;
 
-
-// Around y.
-fn turned(v: vec3f, angle: f32) -> vec3f {
-  let c = cos(angle);
-  let s = sin(angle);
-  return vec3f(c * v.x + s * v.z, v.y, c * v.z - s * v.x);
+fn turned(v: vec3f, turn: vec2f) -> vec3f {
+  return vec3f(turn.x * v.x + turn.y * v.z, v.y, turn.x * v.z - turn.y * v.x);
 }
 
 // Light of the lamp that a white, rough, dielectric surface sends toward the origin.
@@ -78,8 +79,9 @@ fn radiance(direction: vec3f) -> f32 {
   var emitted = 0.0;
   for (var i = 0u; i < 12u; i++) {
     let box = BOXES[i];
-    let ray = turned(direction, -box.turn);
-    let center = turned(box.center, -box.turn);
+    let back = vec2f(box.turn.x, -box.turn.y);
+    let ray = turned(direction, back);
+    let center = turned(box.center, back);
     let enters = (center - sign(ray) * box.half) / ray;
     let leaves = (center + sign(ray) * box.half) / ray;
     let enter = max(enters.x, max(enters.y, enters.z));
@@ -127,12 +129,12 @@ fn alphaOf(lod: f32) -> f32 {
   return roughness * roughness;
 }
 
-// A level is the one before it, filtered by as much as it lacks: normals that face the eye, as PMREMGenerator has it.
+// A level is a sharper one, filtered by as much as that lacks: normals that face the eye, as PMREMGenerator has it.
 @compute @workgroup_size(${GROUP}, ${GROUP})
 fn rougher(@builtin(global_invocation_id) id: vec3u) {
   let size = f32(textureDimensions(level).x);
   let lod = log2(SIZE / size);
-  let before = alphaOf(lod - 1.0);
+  let before = alphaOf(min(lod - 1.0, SHARPER));
   let alpha2 = alphaOf(lod) * alphaOf(lod) - before * before;
   let direction = directionOf(id, size);
   let samples = u32(32.0 * exp2(lod - 1.0));
@@ -173,7 +175,10 @@ export async function makeEnvironment(device: GPUDevice, renderer: WebGPURendere
   const target = targetOf(renderer);
   for (let level = 0; level < LEVELS; level++) {
     const pipeline = level === 0 ? mirror : rougher;
-    const resources = [view(level, '2d-array'), ...(level === 0 ? [] : [view(level - 1, 'cube'), linear])];
+    const resources = [
+      view(level, '2d-array'),
+      ...(level === 0 ? [] : [view(Math.min(level - 1, SHARPER), 'cube'), linear]),
+    ];
     const pass = encoder.beginComputePass({ label });
     pass.setPipeline(pipeline);
     pass.setBindGroup(
@@ -205,8 +210,7 @@ function targetOf(renderer: WebGPURenderer): CubeRenderTarget {
     depthBuffer: false,
   });
   const { texture } = target;
-  for (let level = 0; level < LEVELS; level++)
-    texture.mipmaps.push({ width: SIZE >> level, height: SIZE >> level });
+  for (let level = 0; level < LEVELS; level++) texture.mipmaps.push({ width: SIZE >> level, height: SIZE >> level });
   texture.isPMREMTexture = true;
   renderer.initRenderTarget(target);
   return target;
