@@ -73,7 +73,12 @@ function view({ label, canMove: controls, onReveal, strings }: TemplateModel): T
 /** A box for each name, in their order; where it lies is up to the controller of the hotspots. Under a poster nobody reaches them. */
 function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
   return html`<div id="hotspots" class="layer ${showPoster ? 'gone' : ''}">
-    ${hotspots.map((name) => html`<div class="hotspot hidden"><div><slot name=${name}></slot></div></div>`)}
+    ${hotspots.map(
+      (name) =>
+        html`<div class="hotspot hidden">
+          <div><slot name=${name}></slot></div>
+        </div>`,
+    )}
   </div>`;
 }
 
