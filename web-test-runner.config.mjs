@@ -1,6 +1,6 @@
 /**
  * Tests in real Chromium with WebGPU, on SwiftShader: `npm test`, or after `npm run build`
- * `npx web-test-runner [--files tests/element/browser/lifecycle.test.ts]`; for high-density.test.ts with TEST_GROUP=dense. CHROMIUM names the browser;
+ * `npx web-test-runner [--files tests/element/browser/lifecycle.alone.test.ts]`; for high-density.lab.test.ts with TEST_GROUP=dense. CHROMIUM names the browser;
  * GAUSSIAN_SPLAT_GPU=system takes the machine's own GPU instead of SwiftShader.
  */
 import { relative } from 'node:path';
@@ -8,6 +8,7 @@ import { defaultReporter } from '@web/test-runner';
 import { playwrightLauncher } from '@web/test-runner-playwright';
 import { findChromium, gpuFlags } from './scripts/lib/chromium.mjs';
 import { root } from './scripts/lib/run.mjs';
+import { DENSE } from './scripts/lib/test-files.mjs';
 import { failureLine } from './scripts/lib/slowest-reporter.mjs';
 import { pageCommands } from './tests/element/browser/support/commands.mjs';
 import { hostileServer, startOtherOrigin } from './tests/element/browser/support/server.mjs';
@@ -21,8 +22,6 @@ const FLOAT16_FLAG = '--enable-dawn-features=vulkan_enable_f16_on_nvidia';
 /** Pages that run at once. SwiftShader draws on the processor, but pages wait more than they draw; the groups are those of scripts/lib/test-files.mjs. */
 const CONCURRENCY = { timing: 1, concurrent: 2, dense: 1 };
 const group = process.env.TEST_GROUP ?? 'timing';
-/** Screens whose pixels are half as large. */
-const DENSE = 'tests/element/browser/high-density.test.ts';
 const named = process.env.TEST_FILES?.split(' ').filter(Boolean);
 
 export default {

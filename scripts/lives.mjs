@@ -8,7 +8,7 @@ must(
   process.execPath,
   [
     'node_modules/@web/test-runner/dist/bin.js',
-    ...['--config', 'web-test-runner.config.mjs', '--files', 'tests/element/browser/lives.test.ts'],
+    ...['--config', 'web-test-runner.config.mjs', '--files', 'tests/element/browser/lives.lab.test.ts'],
   ],
   { env: { NODE_ENV: 'test', SOAK_CYCLES: process.argv[2] ?? '500' } },
 );

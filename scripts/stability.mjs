@@ -86,7 +86,7 @@ function runRow(name) {
     STABILITY_FIGURES: figures,
     STABILITY_ROWS: name,
   };
-  const args = ['--import', 'tsx', '--test', '--test-reporter', 'spec', 'tests/stability/catalogue.test.ts'];
+  const args = ['--import', 'tsx', '--test', '--test-reporter', 'spec', 'tests/stability/catalogue.alone.lab.test.ts'];
   return run(process.execPath, args, { env });
 }
 

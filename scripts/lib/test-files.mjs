@@ -4,66 +4,23 @@ import { join } from 'node:path';
 import { root } from './run.mjs';
 
 /**
- * The laboratory, by `npm run test:lab`: tools that look for fewer splats or measure others, in all their breadth; what is judged by a clock; the same again in
- * another framework, another family of models, on another screen, or a hundred times. `npm test` keeps the behaviour of the product, each in one way, and a smoke test of most tools.
+ * `*.lab.test.ts`: the laboratory's, by `npm run test:lab`: tools that look for fewer splats or measure others, in all their breadth; what is judged by a clock; the same again in
+ * another framework, another family of models, on another screen, or a hundred times. `npm test` keeps the behavior of the product, each in one way, and a smoke test of most tools.
  */
-const LABORATORY = [
-  /^tests\/economise\/(?!command|live-mask)/,
-  /^tests\/bench\/(scene|pages)/,
-  /^tests\/frameworks\/browser\/(plain|react-strict|rendered|scenes|vue)/,
-  /^tests\/site\/(compare|cost-card|playground)/,
-  /^tests\/check\/browser\//,
-  // Clocks, large files, long lives, other documents, a dense screen and the controls of others.
-  /^tests\/element\/browser\/(documents|high-density|large-ply|lives|loads-apart|media-chrome|pace|previews)/,
-  // Every family, the examples, and each way in; the mechanism is tested by session, proof, faults, element, instances and post-element.
-  /^tests\/generator\/browser\/(controls|examples\/|families|models|orbit|picture|post-unreachable|provider|scenes|shapes)/,
-  // three.js beside the element; meshes draw with it in npm test.
-  /^tests\/three\/browser\//,
-  // What the registry and `npm run release` are given.
-  /^tests\/packages\/(publish|release)/,
-  // Extremes of scenes and streams; npm test draws each kind of scene, setting and format against the oracle.
-  /^tests\/detail\/(ahead|at-rest|quantized)/,
-  /^tests\/golden\/(depth-key-bits|detail|ingest-shapes|local-precision|rounded-apart|translation)/,
-  /^tests\/stability\/catalogue/,
-  // Stages and WebGL are tested in Node and in the element; losses of the device in device.
-  /^tests\/stages\/browser\//,
-  /^tests\/stability\/browser\/(device-loss|gpu-crash|memory-budget|resize)/,
-];
-/** Tests in Chromium that look at what happens in time, or have the server lose files: no other page runs beside them. */
-const TIMING = [
-  'tests/element/browser/behaviours.test.ts',
-  'tests/element/browser/input.test.ts',
-  'tests/element/browser/lifecycle.test.ts',
-  'tests/element/browser/lost-code.test.ts',
-  'tests/element/browser/meanwhile.test.ts',
-  'tests/element/browser/pace.test.ts',
-  'tests/element/browser/picking.test.ts',
-  'tests/element/browser/previews.test.ts',
-  'tests/element/browser/refused-chunks.test.ts',
-  'tests/element/browser/visitors.test.ts',
-  'tests/generator/browser/element.test.ts',
-  'tests/generator/browser/instances.test.ts',
-  'tests/generator/browser/orbit.test.ts',
-  // It ends the GPU process of the browser, which all pages share.
-  'tests/stability/browser/gpu-crash.test.ts',
-];
-/** Runs in a browser of its own, whose screen is dense. */
-const DENSE = 'tests/element/browser/high-density.test.ts';
-/** Files of Node that take the device of tests/support share a process, and so the device and what it has compiled. */
-const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
-/** What changes shaders for the whole process, or the shared device for good. */
-const OWN_PROCESS = [
-  'tests/golden/frame-levers.test.ts',
-  'tests/golden/host.test.ts',
-  'tests/golden/short-shaders.test.ts',
-  'tests/golden/world.test.ts',
-];
-const TAKES_DEVICE = /from '[./]*support\/(node-device|read-rows|draw-until-calm|work-counters)\.js'/;
+export const isLaboratory = (file) => file.endsWith('.lab.test.ts');
 
-/** Files of Node without a device that leave their process as it was share another: to start one takes longer than most of them. */
-const SHARES_PROCESS = /^tests\/(?!economise|packages)/;
-const CHANGES_PROCESS =
-  /\b(globalThis|mock|memoryUsage)\b|\bprocess\.(?!platform|execPath|cwd|env\.\w+\b(?! =))|performance\.now =|support\/(node-device|devices)|node-gpu/;
+/**
+ * `*.alone.test.ts`, or `*.alone.lab.test.ts`. In Node: has a process of its own, because it changes what others of the process see (globals, shaders, the clock, the device). In Chromium: no other page
+ * runs beside it, because it looks at what happens in time, has the server lose files, or ends the GPU process.
+ */
+const isAlone = (file) => /\.alone\.(lab\.)?test\.ts$/.test(file);
+
+/** Has a browser of its own, whose screen is dense. */
+export const DENSE = 'tests/element/browser/high-density.lab.test.ts';
+/** Files of Node that share a process with the device of tests/support, and so what it has compiled. */
+const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
+/** Files of these folders have a process each: they take the machine's memory or threads. Others share one: to start it takes longer than most of them. */
+const ONE_EACH = /^tests\/(economise|packages)\//;
 
 /** Where the tests of each package are; those of demo and documents are the site's. */
 export const TESTS_OF = {
@@ -87,8 +44,6 @@ export function testFiles() {
   return { browser, node };
 }
 
-export const isLaboratory = (file) => LABORATORY.some((pattern) => pattern.test(file));
-
 /** Whether some tests of a file are the laboratory's (`onlyInLab` of tests/support/extent.ts). */
 export const hasBreadth = (file) =>
   /\bonlyInLab\b|\b(is|itIn)Lab\b|\bsomeOf\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
@@ -96,9 +51,8 @@ export const hasBreadth = (file) =>
 /** Files of Node: those that share a device, those that share a process, and those that have one each. */
 export function byProcess(files) {
   const kindOf = (file) => {
-    const text = readFileSync(join(root, file), 'utf8');
-    if (SHARES_DEVICE.test(file) && !OWN_PROCESS.includes(file) && TAKES_DEVICE.test(text)) return 'sharing';
-    return SHARES_PROCESS.test(file) && !CHANGES_PROCESS.test(text) ? 'together' : 'alone';
+    if (isAlone(file) || ONE_EACH.test(file)) return 'alone';
+    return SHARES_DEVICE.test(file) ? 'sharing' : 'together';
   };
   const ofKind = (kind) => files.filter((file) => kindOf(file) === kind);
   return { sharing: ofKind('sharing'), together: ofKind('together'), alone: ofKind('alone') };
@@ -107,8 +61,8 @@ export function byProcess(files) {
 /** Files of Chromium by group, in the order in which the groups run. */
 export function byGroup(files) {
   return {
-    timing: files.filter((file) => TIMING.includes(file)),
-    concurrent: files.filter((file) => !TIMING.includes(file) && file !== DENSE),
+    timing: files.filter((file) => isAlone(file) && file !== DENSE),
+    concurrent: files.filter((file) => !isAlone(file) && file !== DENSE),
     dense: files.filter((file) => file === DENSE),
   };
 }

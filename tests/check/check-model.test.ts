@@ -211,7 +211,7 @@ test('--draft writes the contract that a file lacks, asks what no header tells, 
   assert.match(again.text, /there already/);
 });
 
-/** What a run writes, as tables say it, of some fixtures: the page must say the same (tests/check/browser/check-page.test.ts). */
+/** What a run writes, as tables say it, of some fixtures: the page must say the same (tests/check/browser/check-page.lab.test.ts). */
 const RUNS = JSON.parse(readFileSync(join(root, 'tests/fixtures/check-runs.json'), 'utf8')) as Record<
   string,
   string[][]

@@ -1,4 +1,4 @@
-/** Shapes of a host's depth through scenes: a leaning plane, a sphere, a bar two pixels wide. Both rasterizers end each pixel where the float64 oracle does. What `npm test` has of it is in world.test.ts: a bar and a wall. */
+/** Shapes of a host's depth through scenes: a leaning plane, a sphere, a bar two pixels wide. Both rasterizers end each pixel where the float64 oracle does. What `npm test` has of it is in world.alone.test.ts: a bar and a wall. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';

@@ -5,7 +5,7 @@
  * web-splat, Visionary and WebSplatter: 25 dB with a far plane of 1e6, by a float64 emulation.
  *
  * Recipe: asked for ten splats at 1e5, far planes of 1e6 and infinity, reversed and orthographic projections. Run with the far planes and with 1e10;
- * tests/golden/world.test.ts draws orthographic projections.
+ * tests/golden/world.alone.test.ts draws orthographic projections.
  *
  * Passes: 59 dB or more with ten splats 100,000 units away, with far planes of 1e6, 1e10 and infinity, while the camera turns. Depth keys
  * use the distance along the axis, so a reversed projection changes nothing.

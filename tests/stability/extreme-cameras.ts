@@ -5,7 +5,7 @@
  * in XR; the camera's centre taken from a transposed matrix is wrong when the view is sheared.
  *
  * Recipe: asked for fields of view from 5 to 160 degrees, lens shifts, sheared and mirrored views, orthographic ones. Run with 500 random cameras for each
- * rasterizer; tests/golden/world.test.ts draws orthographic projections.
+ * rasterizer; tests/golden/world.alone.test.ts draws orthographic projections.
  *
  * Passes: 59 dB or more for fields of view from 5 to 160 degrees, any lens shift, any invertible view.
  */

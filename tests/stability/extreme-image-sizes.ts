@@ -4,7 +4,7 @@
  * Who fails: a texture without size is a validation error (gpuweb #4193); cvlab-epfl/gaussian-splatting-web #23 stretches the picture after a resize.
  *
  * Recipe: asked for 1,000 changes of size, 0 x 0 among them, densities and hidden tabs. Run so with both rasterizers; 0 x 0, density and tabs in the page
- * (browser/resize.test.ts).
+ * (browser/resize.lab.test.ts).
  *
  * Passes: after any sequence of sizes the picture is, byte for byte, that of a renderer that never had another size; no validation error. The page's part, with 0 x 0,
  * `display: none` and hidden tabs, is in tests/stability/browser.

@@ -41,7 +41,7 @@ export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
 
 /**
  * Convolutions that ONNX Runtime's WebGPU provider computes wrongly, without a word (onnxruntime-web 1.30.0, onnxruntime-webgpu 1.27.0;
- * tests/generator/browser/provider.test.ts tries whether it still does). The list saves the time of finding out: what a model writes on the
+ * tests/generator/browser/provider.lab.test.ts tries whether it still does). The list saves the time of finding out: what a model writes on the
  * GPU is compared with what it writes on the CPU in any case.
  */
 export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {

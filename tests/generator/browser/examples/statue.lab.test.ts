@@ -1,6 +1,6 @@
 /**
  * The feed-forward example on its page: it waits for a click, shows what it is given, and says what it costs. At 256 x 256 pixels SwiftShader takes
- * minutes for a run, so the network itself runs in tests/generator/examples.test.ts (the CPU, against a held-out picture) and, small, in families.test.ts
+ * minutes for a run, so the network itself runs in tests/generator/examples.alone.test.ts (the CPU, against a held-out picture) and, small, in families.lab.test.ts
  * (the GPU).
  */
 import { assert, assertEqual, until } from '../../../element/browser/support/harness.js';

@@ -4,7 +4,7 @@
  * Who fails: WebKit #34734 makes running out of memory a loss of the device; splat-transform #22; PlayCanvas #8973 (the splat was gone after the context had come back).
  *
  * Recipe: asked for 50 losses in the middle of frames, losses while loading and inferring, a lower tier after three. Run so without the tier; inference in
- * tests/generator/browser; crashes of the GPU process in gpu-crash.test.ts.
+ * tests/generator/browser; crashes of the GPU process in gpu-crash.alone.lab.test.ts.
  *
  * Passes: the device is destroyed again and again, between and within frames and while a scene or a generator loads: each time the same picture is back within 2 s, with
  * one pair of events. More losses in a row than the element forgives are in tests/element/browser/device.test.ts. A crash of the whole GPU process, which is killed, is one loss more. After a second within seconds Chromium refuses the page every device for some minutes: the element reports `device-lost/unrecoverable`, shows its poster, asks ever more rarely and when the page is shown again, and is back without a reload (after 155 s, 2026-11-25). The quality is not lowered after several losses: a

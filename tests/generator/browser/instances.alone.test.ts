@@ -277,7 +277,7 @@ describe('instances of one generator', () => {
     assertEqual(await codeOf(Generator.open([{ url }, { url: `${FIXTURES}link.onnx` }], device)), 'contract/chain');
   });
 
-  // Twelve times 40,000 Gaussians a run: on SwiftShader that takes minutes. `examples.test.ts` looks at the file itself.
+  // Twelve times 40,000 Gaussians a run: on SwiftShader that takes minutes. `examples.alone.test.ts` looks at the file itself.
   itInLab('of the avatar that ships: ten are one run a frame', async () => {
     const url = '/demo/generators/walker/model.onnx';
     const ten = await Promise.all(
