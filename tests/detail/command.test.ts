@@ -71,7 +71,7 @@ test(
     const { status, text } = detail(sceneOf(400), '--out', out, '--min-db', '40', '--tile', '1x2');
     assert.equal(status, 0, text);
     const manifest = checkManifest(JSON.parse(readFileSync(join(out, 'detail.json'), 'utf8')), 'detail.json');
-    assert.equal(manifest.version, 3);
+    assert.equal(manifest.version, 4);
     for (const { file, chunks, upper } of manifest.trees.flatMap(({ pages }) => pages)) {
       const coded = { chunks, upper, shDegree: manifest.shDegree, coding: manifest.coding! };
       const words = await decodePage(file, new Uint8Array(readFileSync(join(out, file))), coded);

@@ -25,7 +25,7 @@ function movedBy(side: number): readonly Miscompilation[] {
   return [
     {
       shader: /gs\.project/,
-      from: 'let e = project_ellipse(view, g);',
+      from: 'var e = project_ellipse(view, g);',
       to: `var e = project_ellipse(view, g);
         e.center += vec2f(${side} * 1e-4);
         e.depth *= ${factor};

@@ -19,10 +19,13 @@ import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js'
 
 const MOVIE = '/net/sequence/movie.json';
 
-/** Frames in the page's memory or on their way: an inner figure, since nothing else shows that it is bounded. */
-const heldFrames = (element: GaussianSplatElement): number =>
-  (element as unknown as { stage: { scene: { scene: { live: { heldFrames: number } } } } }).stage.scene.scene.live
-    .heldFrames;
+/** Numbers of the frames that the page has fetched from the sequence of a query, each as often as it was. */
+const fetchedFrames = (query: string): number[] =>
+  performance
+    .getEntriesByType('resource')
+    .map(({ name }) => new URL(name).pathname + new URL(name).search)
+    .filter((name) => name.endsWith(query))
+    .map((name) => Number.parseInt(name.split('/').at(-1)!, 10));
 
 async function shows(element: GaussianSplatElement, isColour: (colour: Rgb) => boolean): Promise<boolean> {
   return (await screenOf(element)).middleOf(isColour) !== null;
@@ -159,13 +162,24 @@ describe('a sequence of files', () => {
   });
 
   itInLab('holds two seconds of frames in memory, whatever its length', async () => {
-    const element = await showLoaded({ src: `${MOVIE}?count=300&fps=10` });
+    performance.setResourceTimingBufferSize(5_000);
+    // Frames' own query tells them from those of other tests.
+    const element = await showLoaded({ src: `${MOVIE}?count=300&fps=10&ms=1` });
+    const fetched = (): number[] => fetchedFrames('?ms=1&lost=undefined');
     for (const seconds of [0, 5, 29, 12]) {
+      const before = fetched().length;
       await seek(element, seconds);
-      await delay(200);
-      assert(heldFrames(element) <= 20, `${heldFrames(element)} frames at ${seconds} s`);
+      await delay(300);
+      const added = fetched().slice(before);
+      assert(added.length <= 20, `${added.length} frames fetched at ${seconds} s`);
+      assert(added.every((frame) => frame === 0 || frame >= 10 * seconds - 1), `frames ${added.join()} at ${seconds} s`);
     }
-    assert(heldFrames(element) > 5, 'and fetches ahead');
+    assert(fetched().length > 20, 'and fetches ahead');
+    // A frame that was left behind is not kept: it is fetched again.
+    const again = fetched().length;
+    await seek(element, 5);
+    await delay(300);
+    assert(fetched().slice(again).includes(50), 'frames of another time are dropped');
   });
 
   it('a frame that is not there is told once and passed over', async () => {

@@ -110,7 +110,11 @@ export class ControlsPanel {
     element.addEventListener('inputs-change', () => this.#update());
     element.addEventListener('timeupdate', () => this.#follow());
     element.addEventListener('emptied', () => this.#update());
-    new MutationObserver(() => this.#update()).observe(element, { attributeFilter: ['controls-panel'] });
+    // Inputs of a child that is removed are no longer controlled; its events do not reach the element.
+    new MutationObserver(() => this.#update()).observe(element, {
+      attributeFilter: ['controls-panel'],
+      childList: true,
+    });
   }
 
   /** The panel of an element: made at the first call. */

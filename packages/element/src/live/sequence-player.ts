@@ -88,11 +88,6 @@ export class SequencePlayer implements Timeline {
     return this.#gaussians;
   }
 
-  /** Frames that are in the page's memory or on their way: bounded, whatever the length of the sequence. */
-  get heldFrames(): number {
-    return this.#slots.size;
-  }
-
   /** Shows the frame of a time, if it is there; sees to those that follow. */
   request({ timeSeconds }: LiveState): void {
     const frame = this.#frameAt(timeSeconds);
