@@ -137,7 +137,7 @@ function whyFewPixels(share: number): string[] {
 }
 
 function whyPreview(isPreview: boolean): string[] {
-  return isPreview ? ['The scene is still loading.'] : [];
+  return isPreview ? ['A part is shown; the rest is loading.'] : [];
 }
 
 function whyDropped(dropped: number): string[] {

@@ -28,17 +28,22 @@ const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
 /**
  * The files that show a tileset at a level: 0 is the finest, and each further one leaves out the lowest tiles of all branches.
- * @param toParent where the tileset lies, for one that another names
+ * @param load counts the tiles of all tilesets of a load, which share one limit
+ * @param toParent from the tileset's frame to that of the one which names it
  */
-export function contentsAt(source: JsonSource, level: number, toParent: Affine = IDENTITY): TileContent[] {
+export function contentsAt(
+  source: JsonSource,
+  level: number,
+  load: { tiles: number },
+  toParent: Affine = IDENTITY,
+): TileContent[] {
   const { root } = parseJson(source, MAX_INDEX_BYTES);
   const fail = (path: string, expected: string, found: unknown): never => {
     throw damaged(`${source.name}, ${path}`, expected, show(found), 'decode/header');
   };
-  let tiles = 0;
   const open = (json: unknown, parent: Affine, isParentAdded: boolean, path: string, depth: number): Tile => {
     if (!isObject(json)) return fail(path, 'a tile', json);
-    if (++tiles > MAX_TILES) fail(path, `at most ${grouped(MAX_TILES)} tiles`, 'more');
+    if (++load.tiles > MAX_TILES) fail(path, `at most ${grouped(MAX_TILES)} tiles`, 'more');
     if (depth > MAX_DEPTH) fail(path, `tiles at most ${MAX_DEPTH} deep`, 'deeper ones');
     if (json.implicitTiling !== undefined)
       throw damaged(`${source.name}, ${path}`, 'tiles that are listed', 'implicit tiling', 'decode/unsupported');

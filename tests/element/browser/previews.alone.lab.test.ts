@@ -100,7 +100,7 @@ describe('previews on show', () => {
       const { detail } = seen;
       const first = performance.now() - start;
       assert(detail.splats > 10_000 && detail.splats < 500_000, `${detail.splats} splats`);
-      await frames(1);
+      await until(() => element.stats?.isPreview === true, 'statistics of the preview');
       const { isPreview, why = [] } = element.stats ?? {};
       assert(isPreview && why.some((sentence) => /part/.test(sentence)), `stats say ${why.join(' ')}`);
       assert(!element.loaded && element.revealed && element.matches(':state(preview)'), 'on show, and not loaded');

@@ -71,7 +71,8 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
       uses.set(content.uri, (uses.get(content.uri) ?? 0) + 1);
     }
   };
-  list(contentsAt(source, level), 0);
+  const load = { tiles: 0 };
+  list(contentsAt(source, level, load), 0);
   for (let content = left.pop(); content; content = left.pop()) {
     const { uri, toTileset, depth } = content;
     const [path, query = ''] = uri.split(/(?=\?)/, 2);
@@ -89,7 +90,7 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     }
     if (depth >= MAX_NESTED)
       throw damaged(where, `tilesets at most ${MAX_NESTED} deep`, 'deeper ones', 'decode/header');
-    const inner = contentsAt({ bytes, name: where, budget }, level, toTileset);
+    const inner = contentsAt({ bytes, name: where, budget }, level, load, toTileset);
     list(
       inner.map((one) => ({ ...one, uri: folderOf(path) + one.uri })),
       depth + 1,

@@ -160,7 +160,7 @@ export function describeApp(name: string, { page, mounts, effects }: AppUnderTes
       }
       console.log(`${name}: ${count} of ${mounts} elements are held`);
       assert(count <= MAX_HELD, `${count} elements are still held`);
-    }).timeout(120_000);
+    }).timeout(400_000);
   });
 }
 
