@@ -10,6 +10,7 @@ import {
   nextEvent,
   show,
   showLoaded,
+  until,
 } from './support/harness.js';
 import { isRed, screenOf } from './support/screen.js';
 
