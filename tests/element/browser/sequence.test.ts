@@ -172,7 +172,10 @@ describe('a sequence of files', () => {
       await delay(300);
       const added = fetched().slice(before);
       assert(added.length <= 20, `${added.length} frames fetched at ${seconds} s`);
-      assert(added.every((frame) => frame === 0 || frame >= 10 * seconds - 1), `frames ${added.join()} at ${seconds} s`);
+      assert(
+        added.every((frame) => frame === 0 || frame >= 10 * seconds - 1),
+        `frames ${added.join()} at ${seconds} s`,
+      );
     }
     assert(fetched().length > 20, 'and fetches ahead');
     // A frame that was left behind is not kept: it is fetched again.
