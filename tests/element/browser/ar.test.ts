@@ -10,6 +10,11 @@ const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
 const LIMIT_MS = 3_000;
 const PLANE = 0.3;
 
+interface Session {
+  end(): Promise<void>;
+}
+let session: Session | undefined;
+
 /** The floor of the room: hits of the ray from the eyes, 20 degrees down. */
 function room(): void {
   const { XRSession, XRFrame } = globalThis as unknown as Record<string, { prototype: Record<string, unknown> }>;
@@ -26,17 +31,18 @@ function room(): void {
   ];
 }
 
-/** Cameras that the scene was drawn with. */
+/** An element whose object is placed, and the scene's frame to that of the view. */
 async function start(attributes: Readonly<Record<string, string>>): Promise<[GaussianSplatElement, ArrayLike<number>]> {
-  headset();
+  // The emulator draws two views; those of a phone are at one place.
+  headset().device.ipd = 0;
   room();
   const xr = (navigator as unknown as { xr: { requestSession: unknown; isSessionSupported: unknown } }).xr;
   xr.isSessionSupported = () => Promise.resolve(true);
-  const asked = (xr.requestSession as (mode: string, options: object) => Promise<unknown>).bind(xr);
+  const asked = (xr.requestSession as (mode: string, options: object) => Promise<Session>).bind(xr);
   xr.requestSession = (mode: string, options: object) => {
     assertEqual(mode, 'immersive-ar', 'mode');
     assert(JSON.stringify(options).includes('hit-test'), JSON.stringify(Object.keys(options)));
-    return asked('immersive-ar', { optionalFeatures: ['local-floor'] });
+    return asked('immersive-ar', { optionalFeatures: ['local-floor'] }).then((begun) => (session = begun));
   };
   const { render } = GlRenderer.prototype;
   let camera: { worldToCamera: ArrayLike<number> } | undefined;
@@ -65,6 +71,12 @@ function inRoom(m: ArrayLike<number>, [x, y, z]: readonly number[]): number[] {
 }
 
 describe('AR', () => {
+  // Before the page is cleared: the emulator has a canvas in it.
+  afterEach(async () => {
+    await session?.end().catch(() => undefined);
+    session = undefined;
+  });
+
   itInLab('stands on the plane, front to the person, in its true size', async () => {
     const [element, m] = await start({ 'ar-scale': 'fixed', unit: '10cm' });
     const { bounds } = (element as unknown as { stage: { camera: { bounds: { center: number[]; radius: number } } } })

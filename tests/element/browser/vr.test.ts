@@ -99,16 +99,17 @@ function cameraOf(element: GaussianSplatElement, eye: 'left' | 'right'): Camera 
   return { ...room, worldToCamera: multiply(multiply(multiply(room.worldToCamera, turn), move), upright) };
 }
 
-afterEach(async () => {
-  await session?.end().catch(() => undefined);
-  session = undefined;
-  const { device } = headset();
-  device.position.set(0, 1.6, 0);
-  device.quaternion.set(0, 0, 0, 1);
-  headset().layer = undefined;
-});
-
 describe('VR', () => {
+  // Before the page is cleared: the emulator has a canvas in it.
+  afterEach(async () => {
+    await session?.end().catch(() => undefined);
+    session = undefined;
+    const { device } = headset();
+    device.position.set(0, 1.6, 0);
+    device.quaternion.set(0, 0, 0, 1);
+    headset().layer = undefined;
+  });
+
   it("draws each eye as the oracle of the eye's camera", async () => {
     headset().device.position.set(0, 1.6, 0);
     const element = await showVr();

@@ -22,7 +22,7 @@ export interface XrHost {
   /** What the scene on show was asked for by; null while there is none, and for what no file has. */
   readonly walkable: SceneRequest | null;
   readonly sources: {
-    readonly own: { readonly isLeaving: boolean; readonly scene: { readonly scene: LoadedGaussians | null } };
+    readonly own: { readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean } };
   };
   readonly reveal: { dismiss(): void };
   readonly behaviours: { readonly announcer: Lazy<AnnouncerController> };

@@ -103,9 +103,13 @@ export class XrOffer implements ReactiveController {
     else this.#button.removeAttribute('lang');
     if (!this.canActivate || this.isPresenting) this.#slot.remove();
     else if (!this.#slot.isConnected) this.#place.append(this.#slot);
-    // Out of sight another source is not loaded: the session ends as soon as it is asked for.
-    const { own } = this.stage.sources;
-    if (this.#running && (own.isLeaving || own.scene.scene !== this.#running.shown)) this.end();
+    if (this.#running && this.#isOutdated(this.#running)) this.end();
+  }
+
+  /** Another source is asked for, which is not loaded out of sight, or the page's own splats, which the session draws, are gone. */
+  #isOutdated({ context, shown }: Running): boolean {
+    const { scene } = this.stage.sources.own;
+    return scene.isOutgoing || (context?.isOwn === false && scene.scene !== shown);
   }
 
   hostDisconnected(): void {

@@ -67,6 +67,11 @@ export function headset(): Headset {
   give(XRView, 'projectionMatrix', function (this: { eye: string }) {
     return projection(this.eye);
   });
+  // The emulator reads this of lost contexts, too, which have null.
+  const { getParameter } = WebGL2RenderingContext.prototype;
+  WebGL2RenderingContext.prototype.getParameter = function (name) {
+    return (getParameter.call(this, name) as unknown) ?? (name === this.COLOR_CLEAR_VALUE ? [0, 0, 0, 0] : null);
+  };
   only = {
     ...{ device, layer: undefined, projection },
     pixels(eye) {
