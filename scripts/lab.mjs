@@ -18,6 +18,7 @@ const IN_NODE = {
   bytes: ['scripts/bytes/run-bytes.mjs'],
   gate: ['scripts/gate/run-gate.mjs'],
   sequence: ['scripts/bytes/run-sequence.mjs'],
+  clip: ['--import', 'tsx', 'tests/support/clip-report.ts'],
 };
 
 const [name, ...args] = process.argv.slice(2);

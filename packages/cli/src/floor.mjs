@@ -1,12 +1,19 @@
 /** The work behind `gaussian-splat floor`: reads a scene, finds the floor on which a person can walk, and writes it as a map. */
 import { readScene } from '@gaussian-splat/formats';
-import { encodeWalkMap, makeWalkMap } from '@gaussian-splat/formats/walk';
+import {
+  encodeWalkMap,
+  floorOf,
+  isVoxelPath,
+  makeWalkMap,
+  readVoxels,
+  voxelTreePath,
+} from '@gaussian-splat/formats/walk';
 import { basename, dirname, join, resolve } from 'node:path';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { readWhole } from './lib/input-file.mjs';
 import { writeWhole } from './lib/output-file.mjs';
 
-const USAGE = `usage: gaussian-splat floor SCENE --out FILE.floor [options]
+const USAGE = `usage: gaussian-splat floor SCENE|VOXELS.voxel.json --out FILE.floor [options]
 
   --out FILE      the map, for the attribute walk-map
   --unit LENGTH   length of one unit of the scene, such as 1m or 37cm; default 1m
@@ -87,11 +94,22 @@ function axisOf([x, y, z]) {
   return Object.entries(axes).reduce((best, axis) => (axis[1] > best[1] ? axis : best))[0];
 }
 
-async function main({ scene, out, up, options }) {
+/** From the voxels that splat-transform has made of a scene. */
+async function floorOfVoxels(scene, up, options) {
+  const files = { head: await readWhole(scene), tree: await readWhole(voxelTreePath(scene)), name: basename(scene) };
+  const { grid, solid } = readVoxels(files, FRAMES[up ?? '-y'], options.metersPerUnit);
+  return floorOf(grid, solid, options);
+}
+
+async function floorOfScene(scene, up, options) {
   const openPart = (part) => readWhole(join(dirname(scene), part));
   const cloud = await readScene(await readWhole(scene), { name: basename(scene), openPart });
   sayWarnings(basename(scene), cloud);
-  const map = makeWalkMap(cloud, { ...options, frame: FRAMES[up ?? axisOf(cloud.hints?.up ?? [0, -1, 0])] });
+  return makeWalkMap(cloud, { ...options, frame: FRAMES[up ?? axisOf(cloud.hints?.up ?? [0, -1, 0])] });
+}
+
+async function main({ scene, out, up, options }) {
+  const map = await (isVoxelPath(scene) ? floorOfVoxels : floorOfScene)(scene, up, options);
   if (map.layers.length === 0)
     throw new Error(`${basename(scene)} has no floor: check --up and --unit, or name a point above it with --near`);
   const bytes = encodeWalkMap(map);

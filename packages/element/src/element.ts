@@ -15,6 +15,7 @@ import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
 import { readSpokenStrings, type SpokenStrings } from './words.js';
+import type { SoundProperties } from './live/sound-properties.js';
 import type { ImmersiveMethods } from './xr/methods.js';
 
 /** The properties that move the camera, and what each sets. */
@@ -41,6 +42,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot fallback - Shown if neither WebGPU nor WebGL 2 can draw the scene.
  * @slot error - Shown if the scene cannot be.
  * @slot view - Buttons of the page for its views, each with `data-orbit`.
+ * @slot sound - An `<audio>` or `<video>` that is heard with a scene that moves; its captions are shown.
  * @slot hotspot-* - A label of the page at the point of the scene that its `data-position` names.
  * @csspart canvas - The frame.
  * @csspart poster - The image of the `poster` attribute.
@@ -61,6 +63,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart control-label - The label.
  * @csspart control-input - The slider, field or button.
  * @csspart control-value - The number beside a slider.
+ * @csspart captions - Lines of the captions of the sound.
  * @csspart fallback - The default text if neither WebGPU nor WebGL 2 can draw the scene.
  * @csspart error - The default text after an error.
  * @cssproperty [--poster-fit=cover] - `object-fit` of the poster.
@@ -76,6 +79,9 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty [--views-display=flex] - `none` takes the bar of the views away.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
  * @cssproperty [--max-hotspot-opacity=1] - Opacity of the others.
+ * @cssproperty --captions-background - Ground of captions.
+ * @cssproperty --captions-color - Their color.
+ * @cssproperty --captions-font - Their font.
  * @cssproperty --message-background - Ground of the default texts.
  * @cssproperty --message-color - Their colour.
  * @cssproperty --message-font - Their font.
@@ -109,6 +115,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {Event} seeked - It is shown.
  * @fires {Event} ended - The time has come to its end.
  * @fires {Event} ratechange - The speed of the time has changed.
+ * @fires {Event} volumechange - The sound in the slot `sound` is louder, quieter, muted, or another one.
  * @fires {Event} durationchange - The length of the time is known.
  * @fires {Event} loadedmetadata - Likewise.
  * @fires {Event} loadstart - Loading has begun.
@@ -419,7 +426,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
 /** Methods of VR and AR come with their code. */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging, @typescript-eslint/no-empty-object-type
-export interface GaussianSplatElement extends ImmersiveMethods {}
+export interface GaussianSplatElement extends ImmersiveMethods, SoundProperties {}
 
 declare global {
   interface HTMLElementTagNameMap {

@@ -112,6 +112,8 @@ export interface GaussianSplatEventMap {
   seeked: Event;
   ended: Event;
   ratechange: Event;
+  /** The sound of the scene is louder, quieter, muted or another one. */
+  volumechange: Event;
   durationchange: Event;
   loadedmetadata: Event;
   loadstart: Event;

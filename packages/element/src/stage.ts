@@ -26,6 +26,7 @@ import type { DetailLevers, Drawable, ReadCounts } from './gpu/painter.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { Frame } from './live/frame-filter.js';
 import type { GeneratorInput } from './live/inputs.js';
+import type { SoundHost } from './live/sound.js';
 import type { LiveWiring } from './live/live-wiring.js';
 import type { QueryHost } from './position-from-point.js';
 import { SourceEntry, type SourceOwner } from './source-entry.js';
@@ -96,6 +97,13 @@ export class Stage
     async () => new (await import('./xr/extras.js')).Extras(this.element, this),
     this.#update,
   );
+  /** An `<audio>` or `<video>` of the page that is heard with a scene that moves. */
+  readonly #sound = new Lazy('the code for sound', async () => {
+    const { Sound } = await import('./live/sound.js');
+    const sound = new Sound(this.element as unknown as SoundHost);
+    sound.update();
+    return sound;
+  });
   /** A session shows the scene: the page does not. */
   isImmersed = false;
   /** Puts the frame on paper; fetched after the first frame. */
@@ -486,6 +494,8 @@ export class Stage
     const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
     if (has('splat-scene,splat-mesh')) this.#composition.want(this.#warnOf);
     if (has('[slot^=hotspot-]')) this.labels.want(this.#warnOf);
+    if (has('[slot=sound]')) this.#sound.want(this.#warnOf);
+    this.#sound.value?.update();
     if (has('[data-orbit]')) this.tour.want(this.#warnOf);
     if (this.tour.value) this.element.requestUpdate();
   }

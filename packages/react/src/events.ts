@@ -27,6 +27,7 @@ const EVENTS = {
   onSeeked: 'seeked',
   onEnded: 'ended',
   onRateChange: 'ratechange',
+  onVolumeChange: 'volumechange',
   onDurationChange: 'durationchange',
   onLoadedMetadata: 'loadedmetadata',
   onLoadStart: 'loadstart',

@@ -7,12 +7,17 @@ const SIZE_UNIT = 0.5;
 const OPACITY_UNIT = 0.35;
 const SHAPE_UNIT = 0.3;
 const MOST_COST = 6;
+/** No better match is looked for. */
+const SURE = 0.01;
 /** The search radius, in typical distances between neighbours. */
 const RADIUS = 3;
 /** Rounds in which splats whose best match was taken look for another. */
 const ROUNDS = 3;
 /** Share of the splats of the same numbers that must match for numbers to be taken for names. */
 const SAME_NUMBERS = 0.9;
+/** Passes in which those that found nothing look among those that are left, by the distances of these, and what a pair of them may cost. */
+const SPARSE_PASSES = 2;
+const SPARSE_COST = 2;
 const LEAST_SIZE = 1e-12;
 
 /** What splats are compared by. */
@@ -73,13 +78,49 @@ function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float3
  */
 export function matchFrames(before: Features, next: Features): Int32Array {
   const grid = PlaceGrid.of(next.positions, next.count, RADIUS);
-  return byNumber(before, next, grid.cell) ?? byPlace(before, next, grid);
+  const named = byNumber(before, next, grid.cell);
+  if (named) return named;
+  const found = new Int32Array(next.count).fill(-1);
+  let looking: Uint32Array = Uint32Array.from({ length: before.count }, (_, i) => i);
+  byPlace(before, next, { grid, looking, found, most: MOST_COST });
+  // What is fast and sparse, such as spray, is farther from where it was than others are from one another.
+  for (let pass = 0; pass < SPARSE_PASSES; pass++) {
+    const open = whichOf(found, (owner) => owner < 0);
+    const isFound = new Uint8Array(before.count);
+    for (const owner of found) if (owner >= 0) isFound[owner] = 1;
+    looking = whichOf(isFound, (is) => is === 0);
+    if (open.length < 2 || looking.length === 0) break;
+    const rest = featuresAt(next, open);
+    const own = new Int32Array(open.length).fill(-1);
+    byPlace(before, rest, {
+      ...{ grid: PlaceGrid.of(rest.positions, rest.count, RADIUS), looking, found: own },
+      most: SPARSE_COST,
+    });
+    own.forEach((owner, k) => (found[open[k]] = owner));
+  }
+  return found;
 }
 
-function costOf(a: Features, i: number, b: Features, j: number, unit: number): number {
+const whichOf = (values: Int32Array | Uint8Array, is: (value: number) => boolean): Uint32Array => {
+  const found: number[] = [];
+  for (let i = 0; i < values.length; i++) if (is(values[i])) found.push(i);
+  return Uint32Array.from(found);
+};
+
+function featuresAt({ positions, looks }: Features, chosen: Uint32Array): Features {
+  const own = { positions: new Float32Array(3 * chosen.length), looks: new Float32Array(LOOKS * chosen.length) };
+  chosen.forEach((i, k) => {
+    own.positions.set(positions.subarray(3 * i, 3 * i + 3), 3 * k);
+    own.looks.set(looks.subarray(LOOKS * i, LOOKS * i + LOOKS), LOOKS * k);
+  });
+  return { count: chosen.length, ...own };
+}
+
+/** What a match costs, or some number of at least `enough`. */
+function costOf(a: Features, i: number, b: Features, j: number, unit: number, enough = Infinity): number {
   let cost = 0;
   for (let k = 0; k < 3; k++) cost += ((a.positions[3 * i + k] - b.positions[3 * j + k]) / unit) ** 2;
-  for (let k = 0; k < LOOKS; k++) cost += (a.looks[LOOKS * i + k] - b.looks[LOOKS * j + k]) ** 2;
+  for (let k = 0; k < LOOKS && cost < enough; k++) cost += (a.looks[LOOKS * i + k] - b.looks[LOOKS * j + k]) ** 2;
   return cost;
 }
 
@@ -96,20 +137,30 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
   return same >= SAME_NUMBERS * next.count ? found : undefined;
 }
 
+interface Search {
+  readonly grid: PlaceGrid;
+  /** Splats of the frame before that look for theirs. */
+  readonly looking: Uint32Array;
+  /** [splats of the next frame] the number before, or -1; written. */
+  readonly found: Int32Array;
+  readonly most: number;
+}
+
 /** The pairs that cost least: of those who want the same splat the nearest has it, and the others look again. */
-function byPlace(before: Features, next: Features, grid: PlaceGrid): Int32Array {
-  const found = new Int32Array(next.count).fill(-1);
+function byPlace(before: Features, next: Features, { grid, found, most, ...search }: Search): void {
   const costs = new Float32Array(next.count);
-  let looking = Uint32Array.from({ length: before.count }, (_, i) => i);
+  let { looking } = search;
   for (let round = 0; round < ROUNDS && looking.length > 0; round++) {
     const isOpen = found.map((owner) => (owner < 0 ? 1 : 0));
     const lost: number[] = [];
     for (const i of looking) {
-      let [best, least] = [-1, MOST_COST];
+      let [best, least] = [-1, most];
       grid.forEachNear(before.positions, i, (j) => {
-        if (isOpen[j] === 0) return;
-        const cost = costOf(before, i, next, j, grid.cell);
-        if (cost < least) [best, least] = [j, cost];
+        if (isOpen[j] === 0) return false;
+        const cost = costOf(before, i, next, j, grid.cell, least);
+        if (cost >= least) return false;
+        [best, least] = [j, cost];
+        return cost < SURE;
       });
       if (best < 0) continue;
       const owner = found[best];
@@ -123,5 +174,4 @@ function byPlace(before: Features, next: Features, grid: PlaceGrid): Int32Array 
     }
     looking = Uint32Array.from(lost);
   }
-  return found;
 }

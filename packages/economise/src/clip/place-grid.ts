@@ -5,7 +5,8 @@ const SAMPLES = 200;
 export class PlaceGrid {
   /** Side of a cell, world units: what is farther away than that may not be found. */
   readonly cell: number;
-  readonly #positions: Float32Array;
+  /** [N, 3] the cells of the points, in the order of `#points`. */
+  readonly #cells: Int32Array;
   readonly #mask: number;
   /** Where the points of each bucket begin. */
   readonly #starts: Uint32Array;
@@ -18,45 +19,49 @@ export class PlaceGrid {
 
   constructor(positions: Float32Array, count: number, cell: number) {
     this.cell = cell;
-    this.#positions = positions;
+    const cells = new Int32Array(3 * count);
+    for (let k = 0; k < 3 * count; k++) cells[k] = Math.floor(positions[k] / cell);
     const buckets = 2 ** Math.ceil(Math.log2(Math.max(2, 2 * count)));
     this.#mask = buckets - 1;
     this.#starts = new Uint32Array(buckets + 1);
     const bucketOf = new Uint32Array(count);
     for (let i = 0; i < count; i++) {
-      bucketOf[i] = this.#bucket(this.#at(positions, i, 0), this.#at(positions, i, 1), this.#at(positions, i, 2));
+      bucketOf[i] = this.#bucket(cells[3 * i], cells[3 * i + 1], cells[3 * i + 2]);
       this.#starts[bucketOf[i] + 1]++;
     }
     for (let b = 0; b < buckets; b++) this.#starts[b + 1] += this.#starts[b];
     this.#points = new Uint32Array(count);
     const next = this.#starts.slice();
-    for (let i = 0; i < count; i++) this.#points[next[bucketOf[i]]++] = i;
-  }
-
-  /** Calls with each point in the 27 cells around point `i` of other positions, and perhaps with some that are farther away. */
-  forEachNear(positions: Float32Array, i: number, visit: (point: number) => void): void {
-    const [x, y, z] = [this.#at(positions, i, 0), this.#at(positions, i, 1), this.#at(positions, i, 2)];
-    for (let dx = -1; dx <= 1; dx++) {
-      for (let dy = -1; dy <= 1; dy++) {
-        for (let dz = -1; dz <= 1; dz++) {
-          const bucket = this.#bucket(x + dx, y + dy, z + dz);
-          for (let k = this.#starts[bucket]; k < this.#starts[bucket + 1]; k++) {
-            const point = this.#points[k];
-            // Cells that share a bucket are visited once each.
-            if (
-              this.#at(this.#positions, point, 0) === x + dx &&
-              this.#at(this.#positions, point, 1) === y + dy &&
-              this.#at(this.#positions, point, 2) === z + dz
-            )
-              visit(point);
-          }
-        }
-      }
+    this.#cells = new Int32Array(3 * count);
+    for (let i = 0; i < count; i++) {
+      const place = next[bucketOf[i]]++;
+      this.#points[place] = i;
+      for (let axis = 0; axis < 3; axis++) this.#cells[3 * place + axis] = cells[3 * i + axis];
     }
   }
 
-  #at(positions: Float32Array, i: number, axis: number): number {
-    return Math.floor(positions[3 * i + axis] / this.cell);
+  /** Calls with each point in the 27 cells around point `i` of other positions, those of its own cell first, until a call says that this is enough. */
+  forEachNear(positions: Float32Array, i: number, isEnough: (point: number) => boolean): void {
+    const x = Math.floor(positions[3 * i] / this.cell);
+    const y = Math.floor(positions[3 * i + 1] / this.cell);
+    const z = Math.floor(positions[3 * i + 2] / this.cell);
+    if (this.#isEnoughIn(x, y, z, isEnough)) return;
+    for (let dx = -1; dx <= 1; dx++)
+      for (let dy = -1; dy <= 1; dy++)
+        for (let dz = -1; dz <= 1; dz++) {
+          const isOwn = dx === 0 && dy === 0 && dz === 0;
+          if (!isOwn && this.#isEnoughIn(x + dx, y + dy, z + dz, isEnough)) return;
+        }
+  }
+
+  #isEnoughIn(x: number, y: number, z: number, isEnough: (point: number) => boolean): boolean {
+    const cells = this.#cells;
+    const bucket = this.#bucket(x, y, z);
+    for (let k = this.#starts[bucket]; k < this.#starts[bucket + 1]; k++) {
+      const isHere = cells[3 * k] === x && cells[3 * k + 1] === y && cells[3 * k + 2] === z;
+      if (isHere && isEnough(this.#points[k])) return true;
+    }
+    return false;
   }
 
   #bucket(x: number, y: number, z: number): number {

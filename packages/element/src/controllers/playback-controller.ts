@@ -42,6 +42,8 @@ export class PlaybackController {
   #seekTarget: number | undefined;
   #lastTick: number | undefined;
   #lastUpdate = -Infinity;
+  /** What the time shows was not there. */
+  #isWaiting = false;
   /** Give up waiting to play. */
   readonly #waits = new Set<(reason: DOMException) => void>();
   #pauses = 0;
@@ -193,8 +195,11 @@ export class PlaybackController {
     if (this.#isPaused || Number.isNaN(this.#duration)) return;
     if (isLacking) {
       if (this.#lastTick !== undefined) this.#host.playbackEvent('waiting');
+      this.#isWaiting = true;
       return this.suspend();
     }
+    if (this.#isWaiting) this.#host.playbackEvent('canplay');
+    this.#isWaiting = false;
     if (this.#lastTick === undefined) this.#host.playbackEvent('playing');
     const elapsed = this.#lastTick === undefined ? 0 : (now - this.#lastTick) / 1000;
     this.#lastTick = now;

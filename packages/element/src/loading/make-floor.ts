@@ -1,6 +1,6 @@
 /** The walkable floor of a scene file; loaded by the worker when a page asks for it. */
 import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
-import { makeWalkMap, type WalkMap } from '@gaussian-splat/formats/walk';
+import { floorOf, makeWalkMap, readVoxels, voxelTreePath, type WalkMap } from '@gaussian-splat/formats/walk';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
 import type { FloorRequest } from './protocol.js';
 
@@ -9,12 +9,21 @@ import type { FloorRequest } from './protocol.js';
  * signal's reason once that is aborted.
  */
 export async function makeFloor(request: FloorRequest, signal: AbortSignal): Promise<WalkMap> {
-  const { url, credentials, options } = request;
+  const { credentials, options, voxelUrl } = request;
+  const url = voxelUrl ?? request.url;
   const name = fileName(url);
   try {
     const limits = limitsFrom(request);
     const fetchOptions = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, ...fileLimits(limits()) });
     const bytes = await fetchScene(url, fetchOptions());
+    if (voxelUrl !== undefined) {
+      const address = new URL(url);
+      address.pathname = voxelTreePath(address.pathname);
+      const tree = await fetchScene(address.href, fetchOptions());
+      const { frame, metersPerUnit = 1 } = options;
+      const { grid, solid } = readVoxels({ head: bytes, tree, name, limits: limits() }, frame, metersPerUnit);
+      return floorOf(grid, solid, options);
+    }
     const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, fetchOptions);
     const cloud = await readScene(bytes, { name, signal, openPart, ...limits() });
     return makeWalkMap(cloud, options);

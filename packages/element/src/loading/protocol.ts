@@ -11,6 +11,8 @@ import type { CodedFile, LevelPage, LevelScene, ShPrecision } from '@gaussian-sp
 
 /** A scene file, and the body that walks in it. */
 export interface FloorRequest extends FileRequest {
+  /** Absolute address of a `.voxel.json`, which the floor is found in, in place of the splats. */
+  readonly voxelUrl?: string | undefined;
   readonly options: FloorOptions;
 }
 

@@ -1,5 +1,5 @@
 import type { ViewerFrame } from '../camera/orbit.js';
-import { decodeWalkMap, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
+import { decodeWalkMap, isVoxelPath, type FloorOptions, type WalkMap } from '@gaussian-splat/formats/walk';
 import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
 import { isStreamed } from '../gpu/open-scene.js';
 import type { SceneRequest } from '../loading/protocol.js';
@@ -10,7 +10,7 @@ export interface FloorSource {
   readonly loader: SceneLoader;
   /** What the scene was asked for by. */
   readonly request: SceneRequest;
-  /** Absolute URL of a `.floor` file; null to make the map from the splats. */
+  /** Absolute URL of a `.floor` or `.voxel.json` file; null to make the map from the splats. */
   readonly mapUrl: string | null;
   readonly frame: ViewerFrame;
   readonly metersPerUnit: number;
@@ -27,11 +27,12 @@ const ABOVE_EYES = 0.1;
 export async function openFloor(source: FloorSource, signal: AbortSignal): Promise<WalkMap> {
   const { loader, request, mapUrl, frame, metersPerUnit, eyeHeight, near } = source;
   const { url, file, credentials, limits } = request;
-  if (mapUrl !== null) {
+  const voxelUrl = mapUrl !== null && isVoxelPath(new URL(mapUrl).pathname) ? mapUrl : undefined;
+  if (mapUrl !== null && voxelUrl === undefined) {
     const bytes = await loader.fetchFile({ url: mapUrl, credentials, limits }, signal);
     return decodeWalkMap(new Uint8Array(bytes), mapUrl);
   }
-  if (isStreamed(request))
+  if (voxelUrl === undefined && isStreamed(request))
     throw new GaussianSplatError('argument/value', {
       where: 'walk-map',
       expected: 'a file of the floor, since the scene is streamed',
@@ -39,6 +40,6 @@ export async function openFloor(source: FloorSource, signal: AbortSignal): Promi
       remedy: 'make one with gaussian-splat floor from the file that the folder was made from',
     });
   const options: FloorOptions = { metersPerUnit, frame, height: eyeHeight + ABOVE_EYES, near };
-  const asked = { url, file, credentials, limits, options };
+  const asked = { url, file, credentials, limits, options, voxelUrl };
   return loader.ask({ type: 'floor', request: asked }, signal, ({ makeFloor }) => makeFloor(asked, signal));
 }

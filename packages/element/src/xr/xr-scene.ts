@@ -1,6 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
-import { isGenerator } from '../gpu/open-scene.js';
+import { isHandheld } from '../gpu/memory-budget.js';
+import { isGenerator, isStreamed } from '../gpu/open-scene.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -8,6 +9,9 @@ import { GlLoaded } from '../webgl/gl-loaded.js';
 
 /** How long a context may take to become one for a headset, ms: browsers without a headset never answer. */
 const COMPATIBLE_MS = 2_000;
+
+/** What a session takes of a scene that is streamed elsewhere, bytes: 400,000 splats in headsets and phones, 1.5 million on computers. */
+const STREAM_BYTES = { handheld: 50e6, computer: 186e6 };
 
 /** A scene that a session draws. */
 export interface XrScene {
@@ -65,7 +69,9 @@ export async function openXrScene(
     return { renderer, positions, origin: textures.facts.origin, destroy: () => renderer.destroy() };
   }
   if (isGenerator(request)) throw unsupported('the file of a scene', 'a generator');
-  const asked = { ...request, levels: false, isWhole: true };
+  const inLevels = { ...request, levels: false, isWhole: false };
+  const streamBytes = isStreamed(inLevels) ? STREAM_BYTES[isHandheld() ? 'handheld' : 'computer'] : undefined;
+  const asked = { ...inLevels, streamBytes };
   const { packed } = await loader.load(asked, signal, () => undefined);
   signal.throwIfAborted();
   const gaussians = await GlGaussians.upload(gl, packed);

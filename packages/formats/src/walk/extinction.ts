@@ -3,16 +3,20 @@ import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-
 /** Rows of the rotation from the cloud's frame to a frame with y up. */
 export type UpFrame = readonly [Vector3, Vector3, Vector3];
 
-/** Optical depth of a scene in cubic voxels: a frame with y up, lengths in meters. */
-export interface ExtinctionGrid {
-  /** [nz, ny, nx] sums of `-ln(1 - alpha)`, x innermost. */
-  readonly values: Float32Array;
+/** Cubic voxels: a frame with y up, lengths in meters. */
+export interface VoxelGrid {
   /** Corner of the first voxel, meters. */
   readonly corner: Vector3;
   /** Number of voxels along x, y and z. */
   readonly size: readonly [nx: number, ny: number, nz: number];
   /** Edge of a voxel, meters. */
   readonly voxel: number;
+}
+
+/** Optical depth of a scene in voxels. */
+export interface ExtinctionGrid extends VoxelGrid {
+  /** [nz, ny, nx] sums of `-ln(1 - alpha)`, x innermost. */
+  readonly values: Float32Array;
 }
 
 export interface GridOptions {
@@ -24,7 +28,7 @@ export interface GridOptions {
 }
 
 /** Largest grid: 64 MB of float32. */
-const MAX_VOXELS = 2 ** 24;
+export const MAX_VOXELS = 2 ** 24;
 /** Splats that the grid is made of; scenes with more are sampled evenly, and each sample stands for those around it. */
 const MAX_SPLATS = 500_000;
 /** Share of the splats on each side that may lie outside of the grid, so that distant outliers do not enlarge it. */

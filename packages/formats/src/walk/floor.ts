@@ -1,5 +1,5 @@
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
-import { extinctionOf, type ExtinctionGrid, type GridOptions } from './extinction.js';
+import { extinctionOf, type ExtinctionGrid, type GridOptions, type VoxelGrid } from './extinction.js';
 import { solidsOf } from './solids.js';
 import type { WalkMap } from './walk-map.js';
 
@@ -29,8 +29,11 @@ export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMa
   return floorOf(grid, solidsOf(grid), options);
 }
 
-/** The same from a grid of solid voxels, [nz, ny, nx], 1 for solid. */
-export function floorOf(grid: ExtinctionGrid, solid: Uint8Array, options: Omit<FloorOptions, 'frame'> = {}): WalkMap {
+/** A grid, and what is known of how the density of a solid voxel varies. */
+type FloorGrid = VoxelGrid & Partial<ExtinctionGrid>;
+
+/** The same from a grid of solid voxels, [nz, ny, nx], 1 for solid. Without values a surface lies in the middle of its voxel. */
+export function floorOf(grid: FloorGrid, solid: Uint8Array, options: Omit<FloorOptions, 'frame'> = {}): WalkMap {
   const body: Body = { height: 1.6, radius: 0.2, step: 0.3, ...options };
   const { corner, size, voxel } = grid;
   const middle = [0, 2].map((axis) => corner[axis] + (size[axis] * voxel) / 2);
@@ -73,7 +76,7 @@ function lowestOf(regions: readonly Region[]): Region {
 }
 
 class FloorFinder {
-  readonly #grid: ExtinctionGrid;
+  readonly #grid: FloorGrid;
   readonly #solid: Uint8Array;
   readonly #body: Body;
   /** Heights of all surfaces with free height above, by column. */
@@ -82,7 +85,7 @@ class FloorFinder {
   readonly #seen: number[][];
   readonly #disc: readonly (readonly [x: number, z: number])[];
 
-  constructor(grid: ExtinctionGrid, solid: Uint8Array, body: Body) {
+  constructor(grid: FloorGrid, solid: Uint8Array, body: Body) {
     this.#grid = grid;
     this.#solid = solid;
     this.#body = body;
@@ -117,7 +120,8 @@ class FloorFinder {
         free++;
         continue;
       }
-      if (free >= needed) {
+      if (free >= needed && values === undefined) heights.push(corner[1] + voxel * (y + 0.5));
+      else if (free >= needed && values !== undefined) {
         let peak = y;
         for (let below = y - 1; below >= Math.max(1, y - 2) && this.#solid[column + nx * below] === 1; below--)
           if (values[column + nx * below] > values[column + nx * peak]) peak = below;

@@ -1,0 +1,186 @@
+/** Loaded only where an element has a child with `slot="sound"`. */
+import { css } from 'lit';
+import { adoptStyles } from '../styles.js';
+
+const STYLES = css`
+  .captions {
+    position: absolute;
+    inset-inline: 5%;
+    inset-block-end: 12%;
+    z-index: 1;
+    text-align: center;
+    pointer-events: none;
+  }
+  .captions span {
+    padding: 2px 8px;
+    font: var(--captions-font, 600 18px / 1.5 system-ui, sans-serif);
+    color: var(--captions-color, rgb(255 255 255));
+    background: var(--captions-background, rgb(0 0 0 / 0.8));
+    white-space: pre-line;
+    box-decoration-break: clone;
+  }
+`;
+
+/** Sound that is nearer to the image than this is left alone, seconds. */
+const NEAR = 0.015;
+/** Sound that is farther away is sought; in between it runs a little faster or slower. */
+const FAR = 0.12;
+/** How much of that it makes up for in a second. */
+const GAIN = 2;
+/** Share of the speed that this takes at most: not heard as another pitch, since browsers keep it. */
+const MOST_BEND = 0.1;
+/** Without a frame for so long nobody sees the image move, ms: the sound rests. */
+const STILL_MS = 1_000;
+/** Speeds at which browsers play sound. */
+const [SLOWEST, FASTEST] = [0.0625, 16];
+
+/** The element, as far as its sound has to know it. */
+export interface SoundHost extends HTMLElement {
+  readonly currentTime: number;
+  readonly playbackRate: number;
+  readonly paused: boolean;
+  readonly seeking: boolean;
+  readonly readyState: number;
+}
+
+/** Keeps an `<audio>` or `<video>` of the page in step with a scene that moves, and shows its captions. */
+export class Sound {
+  readonly #element: SoundHost;
+  readonly #captions: HTMLElement;
+  #track: HTMLMediaElement | undefined;
+  #listening: AbortController | undefined;
+  #isRunning = false;
+  /** Time of the scene at which they were compared last. */
+  #alignedTo = NaN;
+  /** The browser waits for a person. */
+  #isRefused = false;
+  #still: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(element: SoundHost) {
+    this.#element = element;
+    adoptStyles(element.shadowRoot!, STYLES);
+    this.#captions = Object.assign(element.ownerDocument.createElement('div'), { className: 'captions' });
+    this.#captions.setAttribute('part', 'captions');
+    for (const type of ['play', 'playing', 'waiting', 'pause', 'seeking', 'seeked', 'ratechange', 'emptied'])
+      element.addEventListener(type, () => this.#follow());
+    Object.defineProperties(element, {
+      muted: { get: () => this.#track?.muted ?? true, set: (isMuted: boolean) => this.#set('muted', isMuted) },
+      volume: { get: () => this.#track?.volume ?? 1, set: (volume: number) => this.#set('volume', volume) },
+    });
+  }
+
+  /** The child may be another one. */
+  update(): void {
+    const child = this.#element.querySelector<HTMLMediaElement>(':scope > :is(audio, video)[slot=sound]') ?? undefined;
+    if (child === this.#track) return;
+    this.#listening?.abort();
+    this.#track?.pause();
+    this.#track = child;
+    this.#captions.remove();
+    if (child) this.#listen(child);
+    this.#follow();
+    this.#element.dispatchEvent(new Event('volumechange'));
+  }
+
+  #set<Name extends 'muted' | 'volume'>(name: Name, value: HTMLMediaElement[Name]): void {
+    if (this.#track) this.#track[name] = value;
+  }
+
+  #listen(child: HTMLMediaElement): void {
+    this.#listening = new AbortController();
+    this.#isRefused = false;
+    const { signal } = this.#listening;
+    child.addEventListener('volumechange', () => this.#element.dispatchEvent(new Event('volumechange')), { signal });
+    child.addEventListener('canplay', () => this.#follow(), { signal });
+    const showCues = (): void => this.#show(child.textTracks);
+    child.textTracks.addEventListener('change', showCues, { signal });
+    const watch = (track: TextTrack): void => track.addEventListener('cuechange', showCues, { signal });
+    for (const track of child.textTracks) watch(track);
+    child.textTracks.addEventListener('addtrack', ({ track }) => track && watch(track), { signal });
+    this.#element.shadowRoot!.append(this.#captions);
+  }
+
+  #show(tracks: TextTrackList): void {
+    const shown = [...tracks].filter(
+      ({ kind, mode }) => mode === 'showing' && (kind === 'captions' || kind === 'subtitles'),
+    );
+    const cues = shown.flatMap(({ activeCues }) => [...(activeCues ?? [])] as VTTCue[]);
+    this.#captions.replaceChildren(
+      ...cues.flatMap((cue) => {
+        const line = this.#element.ownerDocument.createElement('span');
+        line.append(cue.getCueAsHTML());
+        return [line, this.#element.ownerDocument.createElement('br')];
+      }),
+    );
+    const language = shown.find(({ activeCues }) => activeCues?.length)?.language;
+    this.#captions.lang = language ?? '';
+  }
+
+  /** Whether the scene moves forwards, with what it shows at hand, at a speed that sound has. */
+  get #moves(): boolean {
+    const { paused, seeking, playbackRate, readyState } = this.#element;
+    const hasSpeed = playbackRate >= SLOWEST && playbackRate <= FASTEST;
+    return !paused && !seeking && hasSpeed && readyState > HTMLMediaElement.HAVE_CURRENT_DATA;
+  }
+
+  #follow(): void {
+    if (!this.#track || !this.#moves) return this.#rest();
+    if (this.#isRunning) return;
+    this.#isRunning = true;
+    requestAnimationFrame(this.#step);
+  }
+
+  /** Once a frame while the scene plays. */
+  readonly #step = (frameTime: number): void => {
+    const track = this.#track;
+    if (!this.#isRunning || !track) return;
+    if (!this.#moves) return this.#rest();
+    clearTimeout(this.#still);
+    this.#still = setTimeout(() => this.#track?.pause(), STILL_MS);
+    requestAnimationFrame(this.#step);
+    // By then the clock of the scene has gone on to this frame, whoever was called first.
+    setTimeout(() => this.#isRunning && track === this.#track && this.#align(track, frameTime));
+  };
+
+  #align(track: HTMLMediaElement, frameTime: number): void {
+    const { currentTime, playbackRate } = this.#element;
+    const hasMoved = currentTime !== this.#alignedTo;
+    this.#alignedTo = currentTime;
+    if (!hasMoved || track.seeking || track.readyState < HTMLMediaElement.HAVE_METADATA) return;
+    const now = currentTime + (playbackRate * (performance.now() - frameTime)) / 1000;
+    if (now >= track.duration) return track.pause();
+    const late = now - track.currentTime;
+    const share = late / playbackRate;
+    if (Math.abs(share) > FAR) track.currentTime = now;
+    const isOff = Math.abs(share) > NEAR && Math.abs(share) <= FAR;
+    const bend = isOff ? Math.max(-MOST_BEND, Math.min(MOST_BEND, GAIN * share)) : 0;
+    const speed = Math.min(FASTEST, Math.max(SLOWEST, playbackRate * (1 + bend)));
+    if (track.playbackRate !== speed) track.playbackRate = speed;
+    if (track.paused) this.#start(track);
+  }
+
+  /** Before a person has done something on the page, browsers allow no sound: it begins then. */
+  #start(track: HTMLMediaElement): void {
+    if (this.#isRefused) return;
+    track.play().catch(({ name }: DOMException) => {
+      const signal = this.#listening?.signal;
+      if (name !== 'NotAllowedError' || !signal) return;
+      this.#isRefused = true;
+      const retry = (): void => void (this.#isRefused = false);
+      for (const type of ['pointerup', 'keydown'])
+        this.#element.ownerDocument.addEventListener(type, retry, { signal, once: true, capture: true });
+    });
+  }
+
+  #rest(): void {
+    this.#isRunning = false;
+    clearTimeout(this.#still);
+    const track = this.#track;
+    if (!track) return;
+    track.pause();
+    const { currentTime } = this.#element;
+    // Captions are those of the image that stands.
+    if (track.readyState > 0 && Math.abs(track.currentTime - currentTime) > NEAR)
+      track.currentTime = Math.min(currentTime, track.duration || currentTime);
+  }
+}

@@ -1,0 +1,206 @@
+/** The voxels of a scene that splat-transform writes (`.voxel.json` and `.voxel.bin`, versions 1.0 and 1.1), as solids that a floor is found in. */
+import type { Vector3 } from '@gaussian-splat/core';
+import { LoadBudget, type LoadLimits } from '../budget.js';
+import { grouped } from '../bytes.js';
+import { damaged } from '../faults.js';
+import { isObject, parseJson, show } from '../json.js';
+import { MAX_VOXELS, type UpFrame, type VoxelGrid } from './extinction.js';
+
+/** Voxels along the edge of a block. */
+const BLOCK = 4;
+const SOLID = 0xff000000;
+const MAX_HEAD_BYTES = 1 << 20;
+/** Links have 24 bits. */
+const MAX_ENTRIES = 1 << 24;
+const SUFFIX = /\.voxel\.json$/i;
+
+export interface VoxelFiles {
+  /** The `.voxel.json`. */
+  readonly head: Uint8Array;
+  /** The `.voxel.bin`. */
+  readonly tree: Uint8Array;
+  readonly name: string;
+  readonly limits?: LoadLimits | undefined;
+}
+
+/** Solid voxels, [nz, ny, nx], 1 for solid, in a frame with y up, lengths in meters. */
+export interface SolidGrid {
+  readonly grid: VoxelGrid;
+  readonly solid: Uint8Array;
+}
+
+/** Whether a path is that of a voxel header. */
+export const isVoxelPath = (path: string): boolean => SUFFIX.test(path);
+
+/** Path of the octree that belongs to a header. */
+export const voxelTreePath = (path: string): string => path.replace(SUFFIX, '.voxel.bin');
+
+/**
+ * Reads voxels and turns them so that y points up.
+ * @param frame rows of the rotation from the frame of the splats' file
+ * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`
+ */
+export function readVoxels(files: VoxelFiles, frame: UpFrame, metersPerUnit: number): SolidGrid {
+  const { name, tree } = files;
+  const head = readHead(files);
+  const { nodes: nodeCount, words, blocks } = head;
+  if (tree.length !== 4 * (nodeCount + words))
+    throw damaged(name, `${grouped(4 * (nodeCount + words))} bytes of nodes and masks`, grouped(tree.length));
+  const view = new DataView(tree.buffer, tree.byteOffset, tree.byteLength);
+  const numbers = Uint32Array.from({ length: nodeCount + words }, (_, i) => view.getUint32(4 * i, true));
+  const octree = { nodes: numbers.subarray(0, nodeCount), masks: numbers.subarray(nodeCount) };
+  const size = blocks.map((count) => BLOCK * count) as unknown as VoxelGrid['size'];
+  const solid = new Octree(octree, head.depth, size, name).solids();
+  return upright({ corner: head.corner, size, voxel: head.voxel }, solid, head.isTurned, frame, metersPerUnit);
+}
+
+interface VoxelHead {
+  readonly corner: Vector3;
+  readonly blocks: readonly number[];
+  readonly voxel: number;
+  readonly depth: number;
+  readonly nodes: number;
+  readonly words: number;
+  /** From version 1.1 on, the frame is the file's turned by half a turn about z. */
+  readonly isTurned: boolean;
+}
+
+function readHead({ head, name, limits }: VoxelFiles): VoxelHead {
+  const budget = new LoadBudget(head.length, limits);
+  const { version, gridBounds, voxelResolution, leafSize, treeDepth, nodeCount, leafDataCount } = parseJson(
+    { bytes: head, name, budget },
+    MAX_HEAD_BYTES,
+  );
+  const found = /^(\d+)\.(\d+)$/.exec(String(version));
+  if (found?.[1] !== '1') throw damaged(name, 'version 1.0 or 1.1', show(version), 'decode/unsupported');
+  const number = (path: string, value: unknown, least: number, most: number): number => {
+    if (typeof value === 'number' && value >= least && value <= most) return value;
+    throw damaged(`${name}, ${path}`, `a number from ${least} to ${most}`, show(value), 'decode/header');
+  };
+  const whole = (path: string, value: unknown, least: number, most: number): number => {
+    if (Number.isInteger(value)) return number(path, value, least, most);
+    throw damaged(`${name}, ${path}`, 'a whole number', show(value), 'decode/header');
+  };
+  if (!isObject(gridBounds)) throw damaged(`${name}, gridBounds`, 'min and max', show(gridBounds), 'decode/header');
+  const corner = (path: 'min' | 'max'): Vector3 => {
+    const at: unknown = gridBounds[path];
+    if (!Array.isArray(at) || at.length !== 3)
+      throw damaged(`${name}, gridBounds.${path}`, 'three numbers', show(at), 'decode/header');
+    return at.map((value) => number(`gridBounds.${path}`, value, -1e9, 1e9)) as unknown as Vector3;
+  };
+  whole('leafSize', leafSize, BLOCK, BLOCK);
+  const voxel = number('voxelResolution', voxelResolution, 1e-6, 1e6);
+  const depth = whole('treeDepth', treeDepth, 1, 24);
+  const [min, max] = [corner('min'), corner('max')];
+  const blocks = min.map((low, k) => Math.round((max[k] - low) / (BLOCK * voxel)));
+  const isWithin = blocks.every((count) => count >= 1 && count <= 2 ** depth);
+  const voxels = blocks.reduce((product, count) => product * BLOCK * count, 1);
+  if (!isWithin) throw damaged(`${name}, gridBounds`, `1 to ${2 ** depth} blocks along each axis`, blocks.join(' x '));
+  if (voxels > MAX_VOXELS)
+    throw damaged(name, `at most ${grouped(MAX_VOXELS)} voxels`, grouped(voxels), 'decode/unsupported');
+  return {
+    ...{ corner: min, blocks, voxel, depth, isTurned: found[2] !== '0' },
+    nodes: whole('nodeCount', nodeCount, 0, MAX_ENTRIES),
+    words: whole('leafDataCount', leafDataCount, 0, 2 * MAX_ENTRIES),
+  };
+}
+
+/** Follows the nodes from the root down. Children stand behind their parents, so that no way leads round. */
+class Octree {
+  readonly #nodes: Uint32Array;
+  readonly #masks: Uint32Array;
+  readonly #depth: number;
+  readonly #size: VoxelGrid['size'];
+  readonly #name: string;
+  readonly #solid: Uint8Array;
+
+  constructor(
+    { nodes, masks }: { readonly nodes: Uint32Array; readonly masks: Uint32Array },
+    depth: number,
+    size: VoxelGrid['size'],
+    name: string,
+  ) {
+    this.#nodes = nodes;
+    this.#masks = masks;
+    this.#depth = depth;
+    this.#size = size;
+    this.#name = name;
+    this.#solid = new Uint8Array(size[0] * size[1] * size[2]);
+  }
+
+  solids(): Uint8Array {
+    if (this.#nodes.length > 0) this.#visit(0, this.#depth, 0, 0, 0);
+    return this.#solid;
+  }
+
+  /** @param level halvings that are left down to blocks @param x first voxel of the node, as `y` and `z` */
+  #visit(at: number, level: number, x: number, y: number, z: number): void {
+    const [nx, ny, nz] = this.#size;
+    // Beyond the grid the tree is empty. What says otherwise is not followed, so that each visit is of voxels of its own.
+    if (x >= nx || y >= ny || z >= nz) return;
+    const word = this.#nodes[at];
+    const edge = BLOCK * 2 ** level;
+    if (word === SOLID) return this.#fill(edge, x, y, z, () => true);
+    const mask = word >>> 24;
+    if (mask === 0) {
+      if (level > 0 || 2 * word + 1 >= this.#masks.length) throw this.#fault(at);
+      const [low, high] = [this.#masks[2 * word], this.#masks[2 * word + 1]];
+      return this.#fill(edge, x, y, z, (bit) => (((bit < 32 ? low : high) >>> (bit % 32)) & 1) === 1);
+    }
+    let child = word & 0xffffff;
+    if (level === 0 || child <= at) throw this.#fault(at);
+    for (let octant = 0; octant < 8; octant++) {
+      if (((mask >>> octant) & 1) === 0) continue;
+      if (child >= this.#nodes.length) throw this.#fault(at);
+      const half = edge / 2;
+      const upper = (axis: number): number => half * ((octant >>> axis) & 1);
+      this.#visit(child++, level - 1, x + upper(0), y + upper(1), z + upper(2));
+    }
+  }
+
+  #fill(edge: number, x: number, y: number, z: number, isSolid: (bit: number) => boolean): void {
+    const [nx, ny, nz] = this.#size;
+    for (let k = z; k < Math.min(nz, z + edge); k++)
+      for (let j = y; j < Math.min(ny, y + edge); j++)
+        for (let i = x; i < Math.min(nx, x + edge); i++)
+          if (isSolid((i & 3) + 4 * (j & 3) + 16 * (k & 3))) this.#solid[i + nx * (j + ny * k)] = 1;
+  }
+
+  #fault(at: number): Error {
+    return damaged(
+      this.#name,
+      'an octree whose nodes lead to nodes and masks behind them',
+      `node ${at}: ${show(`0x${this.#nodes[at].toString(16)}`)}`,
+    );
+  }
+}
+
+/** The same voxels along the axes of another frame: each takes what lies at its middle. */
+function upright(grid: VoxelGrid, solid: Uint8Array, isTurned: boolean, frame: UpFrame, unit: number): SolidGrid {
+  const sign = isTurned ? [-1, -1, 1] : [1, 1, 1];
+  const rows = frame.map((row) => row.map((value, k) => value * sign[k]));
+  const ends = grid.corner.map((low, k) => [low, low + grid.size[k] * grid.voxel]);
+  const ranges = rows.map((row) =>
+    [Math.min, Math.max].map((pick) => sum(row.map((v, k) => pick(...ends[k].map((end) => v * end))))),
+  );
+  const size = ranges.map(([low, high]) =>
+    Math.max(1, Math.round((high - low) / grid.voxel)),
+  ) as unknown as VoxelGrid['size'];
+  const corner = ranges.map(([low]) => low) as unknown as Vector3;
+  const turned = new Uint8Array(size[0] * size[1] * size[2]);
+  // The rotation's inverse has its columns as rows.
+  const from = (axis: number, p: readonly number[]): number =>
+    Math.floor((sum(rows.map((row, k) => row[axis] * p[k])) - grid.corner[axis]) / grid.voxel);
+  for (let z = 0, at = 0; z < size[2]; z++)
+    for (let y = 0; y < size[1]; y++)
+      for (let x = 0; x < size[0]; x++, at++) {
+        const p = [x, y, z].map((value, k) => corner[k] + (value + 0.5) * grid.voxel);
+        const [i, j, k] = [from(0, p), from(1, p), from(2, p)];
+        const isInside = i >= 0 && j >= 0 && k >= 0 && i < grid.size[0] && j < grid.size[1] && k < grid.size[2];
+        if (isInside) turned[at] = solid[i + grid.size[0] * (j + grid.size[1] * k)];
+      }
+  const scaled = corner.map((value) => unit * value) as unknown as Vector3;
+  return { grid: { corner: scaled, size, voxel: unit * grid.voxel }, solid: turned };
+}
+
+const sum = (values: readonly number[]): number => values.reduce((total, value) => total + value, 0);
