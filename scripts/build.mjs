@@ -123,6 +123,8 @@ async function buildDemo() {
   rmSync(to, { recursive: true, force: true });
   const { writeSequence } = await import('../demo/site/sequence-scene.mjs');
   await writeSequence(join(to, 'scenes/knot'));
+  const { writeClip } = await import('../demo/site/clip-scene.mjs');
+  await writeClip(join(to, 'scenes'));
   const { writePavilion } = await import('../demo/site/pavilion.mjs');
   writePavilion(join(to, 'scenes/pavilion.glb'));
   // Its packages were not there when this script started on a fresh clone.

@@ -251,7 +251,7 @@ export const ATTRIBUTES = {
    */
   navigation: keyword<Navigation>(['orbit', 'fly', 'walk']),
   /**
-   * URL of a map of the floor for `navigation="walk"`, written by `gaussian-splat floor`. `auto` makes one from the splats after the scene has loaded.
+   * URL of a map of the floor for `navigation="walk"`, written by `gaussian-splat floor`, or of voxels (`.voxel.json`) of splat-transform. `auto` makes one from the splats after the scene has loaded.
    * @default `auto`
    * @example walk-map="garden.floor"
    */
