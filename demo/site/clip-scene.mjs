@@ -87,7 +87,11 @@ function vaseSplat(i, seconds) {
       -(1.9 * height) * eased - 0.25 * wind * (1 + scatter(0.6710436067)),
       reach * Math.sin(swirl) + 0.3 * gone * scatter(0.5497004779),
     ],
-    ...{ size: 0.03 + 0.02 * (1 - gone / (DRIFT + 1)), opacity: 0.95 * fade, color: color.map((value) => value * light) },
+    ...{
+      size: 0.03 + 0.02 * (1 - gone / (DRIFT + 1)),
+      opacity: 0.95 * fade,
+      color: color.map((value) => value * light),
+    },
     turn: [Math.cos(angle / 2), 0, Math.sin(angle / 2), 0],
   };
 }

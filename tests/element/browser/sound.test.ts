@@ -60,10 +60,35 @@ async function showWithSound(isMuted = true): Promise<[GaussianSplatElement, HTM
   return [element, audio];
 }
 
+/** Lets an element play by a clock of its own that begins 80 ms late and runs 0.2 % too fast: on a machine without a sound card, which draws with its processor, real sound stutters. */
+function steady(audio: HTMLAudioElement): void {
+  let [at, since, rate, isPaused] = [0, 0, 1, true];
+  const now = (): number => (isPaused ? at : at + Math.max(0, (1.002 * rate * (performance.now() - since)) / 1000));
+  const set = (change: () => void): void => {
+    at = now();
+    since = Math.max(since, performance.now());
+    change();
+  };
+  Object.defineProperties(audio, {
+    currentTime: { get: now, set: (seconds: number) => set(() => (at = seconds)) },
+    playbackRate: { get: () => rate, set: (value: number) => set(() => (rate = value)) },
+    paused: { get: () => isPaused },
+    pause: { value: () => set(() => (isPaused = true)) },
+    play: {
+      value: () => {
+        if (isPaused) since = performance.now() + 80;
+        isPaused = false;
+        return Promise.resolve();
+      },
+    },
+  });
+}
+
 describe('sound', () => {
   it('runs with the clip, within 40 ms, at its speed, and stands with it', async () => {
     const [element, audio] = await showWithSound();
     assertEqual(element.muted, true, 'muted');
+    steady(audio);
     element.playbackRate = 0.25;
     const off: number[] = [];
     const ended = nextEvent(element, 'ended');
@@ -87,7 +112,7 @@ describe('sound', () => {
     await until(() => audio.paused, 'silence', LIMIT_MS);
     off.sort((a, b) => a - b);
     console.log(`sound is off by ${off.map((value) => (1000 * value).toFixed(0)).join(', ')} ms`);
-    assert(off.length > 2 && off[off.length >> 1] <= 0.04, `off by ${off.join(', ')} s`);
+    assert(off.length > 2 && off[Math.floor(0.8 * off.length)] <= 0.04, `off by ${off.join(', ')} s`);
   });
 
   it('follows seeks and pauses, loops, and says when it is muted', async () => {
