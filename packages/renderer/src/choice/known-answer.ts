@@ -2,6 +2,7 @@ import { eyeOf, lookAt, multiply, type Camera, type GaussianCloud } from '@gauss
 import { capture } from '../capture.js';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { constants } from '../generated/shaders.js';
+import { turn } from '../gpu/page-thread.js';
 import { packKept, type PackedGaussians } from '../pack/pack.js';
 import type { GaussianScene } from '../gaussian-scene.js';
 import type { FrameSettings } from '../frame-target.js';
@@ -22,6 +23,8 @@ const SMALL = 4_500;
 const [WIDTH, HEIGHT] = [276, 136];
 /** Of frames in motion and of frames at rest: shares of the visible range of depths, and depths. */
 const KEY_BITS = [16, 32] as const;
+/** Milliseconds after which the reference lets other tasks of the page run. */
+const SLICE_MS = 6;
 const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 
 /** True if a renderer with these options draws the image that the mathematics ask for: of two scenes, whose splats lie among one another. */
@@ -32,14 +35,18 @@ export const givesKnownAnswer = async (device: GPUDevice, options: FrameSettings
 export async function faultOf(device: GPUDevice, options: FrameSettings): Promise<string | undefined> {
   const threads = options.threads === 'serial' ? 'serial' : 'parallel';
   if (!(await sumsAndSorts(device, threads))) return `${threads} prefix sums or the ${threads} sort`;
+  // Each step is a task of its own: a page that starts has frames to show meanwhile.
+  await turn();
   const clouds = [sphereCloud(LARGE, 0.8), sphereCloud(SMALL, 0.08, 2.4)];
   const camera = shearedCamera(WIDTH, HEIGHT);
-  const scenes = await Promise.all(
-    clouds.map((cloud) => GaussianBuffers.upload(device, packSpheres(cloud, 'float16'))),
-  );
+  const scenes: GaussianBuffers[] = [];
+  for (const cloud of clouds) {
+    await turn();
+    scenes.push(await GaussianBuffers.upload(device, packSpheres(cloud, 'float16')));
+  }
   const renderer = viewpointOf(device, scenes, options);
   try {
-    const expected = drawSpheres(clouds, camera);
+    const expected = await drawSpheres(clouds, camera);
     for (const depthKeyBits of KEY_BITS) {
       const pixels = await capture(device, renderer, { camera, settings: { ...options, depthKeyBits } });
       if (!isNear(pixels, expected)) return `frames of ${options.rasterizer} in ${options.accumulation}, ${threads}`;
@@ -131,8 +138,13 @@ export function packSpheres(
   };
 }
 
-/** The image in float64, front to back: spheres have closed forms where other splats need matrices. */
-function drawSpheres(clouds: readonly GaussianCloud[], camera: Camera): Float64Array {
+/**
+ * The image in float64, front to back: spheres have closed forms where other splats need matrices. Other tasks of the page run every
+ * {@link SLICE_MS}.
+ */
+async function drawSpheres(clouds: readonly GaussianCloud[], camera: Camera): Promise<Float64Array> {
+  await turn();
+  let end = performance.now() + SLICE_MS;
   const { width, height, near } = camera;
   const pixels = new Float64Array(4 * width * height).map((_, i) => (i % 4 === 3 ? 1 : 0));
   const eye = eyeOf(camera.worldToCamera);
@@ -140,7 +152,12 @@ function drawSpheres(clouds: readonly GaussianCloud[], camera: Camera): Float64A
     Array.from({ length: cloud.count }, (_, i) => projectSphere(cloud, i, camera, eye)),
   );
   const visible = spheres.filter(({ depth }) => depth >= near);
-  for (const sphere of visible.sort((a, b) => a.depth - b.depth)) drawSphere(pixels, sphere, camera);
+  for (const sphere of visible.sort((a, b) => a.depth - b.depth)) {
+    drawSphere(pixels, sphere, camera);
+    if (performance.now() < end) continue;
+    await turn();
+    end = performance.now() + SLICE_MS;
+  }
   return pixels.map((value, i) => (i % 4 === 3 ? 1 - value : value));
 }
 
