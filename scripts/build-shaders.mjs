@@ -8,7 +8,7 @@
 import { mkdirSync, readdirSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { ResourceType } from 'wgsl_reflect/wgsl_reflect.module.js';
-import { ownCode, partsOf, reflect, reflectStruct, shaderFolder } from './lib/shader-source.mjs';
+import { modifiedCode, ownCode, partsOf, reflect, reflectStruct, shaderFolder } from './lib/shader-source.mjs';
 
 const generatedOf = (name) => fileURLToPath(new URL(`../packages/${name}/src/generated/`, import.meta.url));
 
@@ -30,6 +30,25 @@ const QUANTIZED = {
   stages: ['cull', 'cull_serial', 'pixel_depths', 'probe_surface', 'project'],
   replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
 };
+/**
+ * Stages that are made once more for splats that a page cuts, reveals or moves: `cull_modified` of `cull` and so on, which call other functions in place of those that
+ * read and pack a splat. The text of the stages themselves stays as it is.
+ */
+const MODIFIED = {
+  stages: {
+    cull_chunks: 'shared/modified_chunk',
+    ...Object.fromEntries(QUANTIZED.stages.map((stage) => [stage, 'shared/modified_gaussian'])),
+  },
+  called: {
+    may_be_visible: 'may_be_modified',
+    unpack_gaussian: 'modified_gaussian',
+    pack_splat: 'pack_modified',
+  },
+};
+RARE['modified-shaders'] = [
+  'cull_chunks_modified',
+  ...QUANTIZED.stages.flatMap((stage) => [`${stage}_modified`, `${stage}_quantized_modified`]),
+];
 /** Those of another package, which takes shared parts from the renderer. */
 const ECONOMISE = 'economise';
 RARE[ECONOMISE] = [
@@ -94,20 +113,35 @@ const quantizedStages = QUANTIZED.stages.map((path) => ({
   path,
   replaced: QUANTIZED.replaced,
 }));
-const stages = [...plainStages, ...quantizedStages];
+const modifiedStages = [...plainStages, ...quantizedStages]
+  .filter(({ path }) => path in MODIFIED.stages)
+  .map((plain) => ({ ...plain, stage: `${plain.stage}_modified`, added: MODIFIED.stages[plain.path] }));
+const stages = [...plainStages, ...quantizedStages, ...modifiedStages];
 /** By name: the layout or the number, and the files whose stages say it. */
 const structs = new Map();
 const constants = new Map();
 /** Each file once, however many stages import it: a page loads them all. */
 const parts = new Map();
+/** The parts of a stage with other functions called in them, and those parts that have the functions. */
+function modifiedParts(plainPaths, added) {
+  for (const path of added) parts.set(path, ownCode(path));
+  const paths = plainPaths.map((path) => {
+    const code = modifiedCode(path, MODIFIED.called);
+    if (added.includes(path) || code === parts.get(path)) return path;
+    parts.set(`${path}_modified`, code);
+    return `${path}_modified`;
+  });
+  return [...paths, ...added.filter((path) => !plainPaths.includes(path))];
+}
 const partName = (path) => `${camelCase(path.replace('/', '_'))}Part`;
 const stageFiles = ['shaders', ...Object.keys(RARE)];
 const partsIn = Object.fromEntries(stageFiles.map((file) => [file, new Set()]));
 const sections = Object.fromEntries(stageFiles.map((file) => [file, []]));
-for (const { stage, path: ownPath, replaced } of stages) {
+for (const { stage, path: ownPath, replaced, added } of stages) {
   const home = fileOf(stage);
-  const paths = partsOf(ownPath, replaced);
-  for (const path of paths) parts.set(path, ownCode(path));
+  const plainPaths = partsOf(ownPath, replaced);
+  for (const path of plainPaths) parts.set(path, ownCode(path));
+  const paths = added ? modifiedParts(plainPaths, partsOf(added, replaced)) : plainPaths;
   for (const path of paths) partsIn[home].add(path);
   const code = paths.map((path) => parts.get(path)).join('\n');
   const reflection = reflect(stage, code);
@@ -137,7 +171,11 @@ function saidBy(named, isMeant) {
 }
 
 /** Files whose own structs lie beside them: pages without these stages do not load their layouts either. */
-const LAYOUTS = { 'clip-shaders': 'clip-layouts', 'live-shaders': 'live-layouts' };
+const LAYOUTS = {
+  'clip-shaders': 'clip-layouts',
+  'live-shaders': 'live-layouts',
+  'modified-shaders': 'modified-layouts',
+};
 const layoutsOf = (homes) => (homes.size === 1 ? LAYOUTS[[...homes][0]] : undefined);
 const isOfRenderer = (homes) => [...homes].some((file) => file !== ECONOMISE);
 const byName = ([a], [b]) => (a < b ? -1 : 1);

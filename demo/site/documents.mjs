@@ -12,6 +12,7 @@ const SECTIONS = [
       ...['start', 'prepare', 'attributes', 'camera', 'loading', 'labels', 'animation', 'styling', 'events'].map(guide),
       ...[
         'scenes-and-meshes',
+        'effects',
         'large-scenes',
         'performance',
         'accessibility',

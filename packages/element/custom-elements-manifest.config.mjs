@@ -66,6 +66,7 @@ const ENTRIES = [
   'src/scenes.ts',
   'src/composition/splat-scene.ts',
   'src/composition/splat-mesh.ts',
+  'src/effects/splat-cut.ts',
 ];
 /** The life cycle of Lit and of the platform is inherited as well, and nobody's concern. */
 const LIFE_CYCLE = [
@@ -94,6 +95,7 @@ export default {
     'src/attributes.ts',
     'src/composition/child.ts',
     'src/composition/attributes.ts',
+    'src/effects/attributes.ts',
   ],
   outdir: '.',
   litelement: true,

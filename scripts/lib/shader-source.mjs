@@ -25,6 +25,14 @@ export function ownCode(path) {
   return code.replace(IMPORT, '').trim();
 }
 
+/** The same, with other functions called than those that it names; none where it declares them. */
+export function modifiedCode(path, called) {
+  const names = Object.keys(called).join('|');
+  const code = ownCode(path);
+  if (new RegExp(`\\bfn (${names})\\(`).test(code)) return code;
+  return code.replace(new RegExp(`\\b(${names})(?=\\()`, 'g'), (name) => called[name]);
+}
+
 /** Comments and indentation are for readers of shaders/, not for the bytes that a page loads. */
 function strip(code) {
   return code

@@ -26,6 +26,8 @@ import {
   type OracleLayer,
   type ScreenSplat,
 } from './blend.js';
+import type { SplatCut } from '@gaussian-splat/renderer/modifiers';
+import { cutCloud } from './cut.js';
 import { densestDepth } from './densest.js';
 import { footprintOf } from './footprint.js';
 import { projectEllipse, toCamera, worldPosition } from './projection.js';
@@ -77,6 +79,7 @@ export interface PlacedCloud {
   readonly sceneToWorld?: Matrix4;
   readonly opacity?: number;
   readonly crop?: { readonly min: Vector3; readonly max: Vector3 };
+  readonly cuts?: readonly SplatCut[];
 }
 
 /** Draws clouds that stand in one world, blended together. Each is seen as it is in its own frame: its harmonics turn with it. */
@@ -87,7 +90,8 @@ export function renderOracleWorld(
 ): OracleImage {
   const rules = typeof options.rules === 'string' ? RULES[options.rules] : options.rules;
   let first = 0;
-  const splats = placed.flatMap(({ cloud, mode, sceneToWorld, opacity = 1, crop }) => {
+  const splats = placed.flatMap(({ cloud: whole, mode, sceneToWorld, opacity = 1, crop, cuts = [] }) => {
+    const { cloud, recolor } = cutCloud(whole, cuts, sceneToWorld);
     const worldToCamera = sceneToWorld ? multiply(camera.worldToCamera, sceneToWorld) : camera.worldToCamera;
     const isInside = (i: number): boolean =>
       crop === undefined || worldPosition(cloud, i).every((v, axis) => v >= crop.min[axis] && v <= crop.max[axis]);
@@ -95,7 +99,9 @@ export function renderOracleWorld(
     const all = screenSplats(faded, { ...camera, worldToCamera }, rules, { rules, mode, order: options.order });
     const start = first;
     first += cloud.count;
-    return all.filter(({ index }) => faded.opacities[index] > 0).map((s) => ({ ...s, index: start + s.index }));
+    return all
+      .filter(({ index }) => faded.opacities[index] > 0)
+      .map((s) => ({ ...s, color: recolor(s.index, s.color), index: start + s.index }));
   });
   const image = emptyImage(camera.width, camera.height, first);
   blenderOf(options)(image, nearestFirst(splats), rules, options.depth, options.layers);

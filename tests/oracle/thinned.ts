@@ -13,7 +13,11 @@ export function dilogarithm(a: number): number {
 
 /** Opacity of a splat of a scene whose opaque surfaces (transmittance 1e-4) are to have the given opacity. */
 export function thinned(own: number, opacity: number): number {
-  const factor = Math.min(1, Math.log(1 - opacity) / Math.log(1e-4));
+  return thinnedBy(own, Math.min(1, Math.log(1 - opacity) / Math.log(1e-4)));
+}
+
+/** Opacity of a splat whose optical depth is multiplied by a factor. */
+export function thinnedBy(own: number, factor: number): number {
   if (factor >= 1) return own;
   const wanted = factor * dilogarithm(Math.min(own, ALPHA_MAX));
   let [low, high] = [0, 1];

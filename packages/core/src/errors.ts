@@ -54,6 +54,8 @@ export type ErrorCode =
   /** A caller's argument breaks the documented contract of a function. */
   | 'argument/camera'
   | 'argument/cloud'
+  /** A function of a page for its splats is not WGSL that compiles. */
+  | 'argument/splat-shader'
   /** A method was called outside of a person's click. */
   | 'argument/activation'
   | 'argument/value';

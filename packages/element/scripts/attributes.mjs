@@ -1,4 +1,4 @@
-/** What is made from the tables in src/attributes.ts and src/composition/attributes.ts: the attributes of the manifest, and rows of documents. */
+/** What is made from the tables in src/attributes.ts, src/composition/attributes.ts and src/effects/attributes.ts: the attributes of the manifest, and rows of documents. */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 
@@ -19,6 +19,11 @@ const TABLES = {
     table: 'MESH_ATTRIBUTES',
     document: path('../../../docs/guide/scenes-and-meshes.md'),
     rows: /(<!-- attributes of splat-mesh: [^>]*-->\n)[^]*?(\n<!-- end -->)/,
+  },
+  'splat-cut': {
+    table: 'CUT_ATTRIBUTES',
+    document: path('../../../docs/guide/effects.md'),
+    rows: /(<!-- attributes of splat-cut: [^>]*-->\n)[^]*?(\n<!-- end -->)/,
   },
 };
 

@@ -17,6 +17,7 @@ export const SHADER_FILES = [
   'depth-shaders.js',
   'linear-shaders.js',
   'order-shaders.js',
+  'modified-shaders.js',
 ].map((file) => FOLDER + file);
 
 const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;

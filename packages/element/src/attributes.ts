@@ -143,6 +143,13 @@ export const ATTRIBUTES = {
    */
   reveal: keyword<Reveal>(['auto', 'manual']),
   /**
+   * How the scene appears: `fade`, `grow` from its center, `sweep` along an axis (`x`, `-y` ...), or `detail`, from coarse to fine while it loads; with a time such as `2s`. Visitors who
+   * ask for less motion see it at once. The property `revealProgress`, 0 to 1, drives it by hand.
+   * @default `none`
+   * @example reveal-effect="sweep y 2s"
+   */
+  revealEffect: text(),
+  /**
    * Lets visitors orbit, pan and zoom with mouse, touch and keyboard.
    * @example camera-controls
    */

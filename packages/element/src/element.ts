@@ -95,6 +95,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {ProgressEvent} progress - Bytes have arrived.
  * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is visible while the rest loads.
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
+ * @fires {CustomEvent<GaussianSplatError>} shader-error - The function of `splatShader` does not compile; `detail` names the line. The scene is drawn without it.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
  * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
  * @fires {CustomEvent<WalkReadyDetail>} walk-ready - Fired when the floor of `navigation="walk"` is known and the camera stands on it.

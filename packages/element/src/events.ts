@@ -1,3 +1,4 @@
+import type { GaussianSplatError } from '@gaussian-splat/core';
 import type { ScenePoint } from './camera/values.js';
 import type { ElementError } from './errors.js';
 
@@ -77,6 +78,8 @@ export interface GaussianSplatEventMap {
   progress: ProgressEvent;
   /** A part of the scene is shown while the rest of it loads: fewer splats, or splats without their view-dependent colours. */
   preview: CustomEvent<PreviewDetail>;
+  /** The function of `splatShader` does not compile; `detail` names the line. The scene is drawn without it. */
+  'shader-error': CustomEvent<GaussianSplatError>;
   /** The scene cannot be shown; the same object as `element.error`. */
   error: CustomEvent<ElementError>;
   /** The camera has moved; at most once a frame. */

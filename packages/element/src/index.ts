@@ -21,6 +21,7 @@ export type { SettableProperties } from './media.js';
 export type { ImageOptions } from './viewing.js';
 export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './views/camera-view.js';
 export type { Easing } from './views/path.js';
+export type { SplatShader, SplatUniform } from '@gaussian-splat/renderer/modifiers';
 export type { NamedView } from './views/read-views.js';
 export type { FlightOptions, PathOptions } from './views/tour.js';
 export type {

@@ -21,8 +21,8 @@ export class Member {
     const before = this.#placement;
     if (before.scene !== this.scene.drawn) {
       this.remove();
-      const { sceneToWorld, opacity, crop, visible, bounds } = before;
-      this.#placement = this.#add({ sceneToWorld, opacity, crop, visible, bounds });
+      const { sceneToWorld, opacity, crop, visible, modifier, bounds } = before;
+      this.#placement = this.#add({ sceneToWorld, opacity, crop, visible, modifier, bounds });
     }
     const { bounds } = this.scene;
     if (bounds !== this.#bounds) this.#placement.bounds = this.#bounds = bounds;

@@ -1,3 +1,4 @@
+import type { SplatShader } from '@gaussian-splat/renderer/modifiers';
 import { LitElement, type PropertyDeclarations } from 'lit';
 import { declarations, flags, type AttributeProperties } from './attributes.js';
 import type { GaussianSplatEventMap } from './events.js';
@@ -13,6 +14,8 @@ export class SplatProperties extends LitElement {
   static override properties: PropertyDeclarations = {
     ...declarations(),
     inputValues: { attribute: false },
+    splatShader: { attribute: false },
+    revealProgress: { attribute: false },
     // Accessors of MediaProperties: named here so that what a page sets before the element is defined reaches them.
     currentTime: { attribute: false, noAccessor: true },
     playbackRate: { attribute: false, noAccessor: true },
@@ -20,6 +23,15 @@ export class SplatProperties extends LitElement {
 
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
   declare inputValues: ControlValues | null;
+
+  /**
+   * A WGSL function of the page for each splat, `{ code, uniforms, animated, moves }`; null for none. New values are a new object; the same code is not compiled again. `shader-error` tells of
+   * one that does not compile.
+   */
+  declare splatShader: SplatShader | null;
+
+  /** How far the scene has appeared with `reveal-effect`, 0 to 1: for pages that drive it, by scrolling for example. null, the default: by time. */
+  declare revealProgress: number | null;
 
   static {
     // The element draws, and so learns what its template shows, after an update. Lit's development build warns of that.

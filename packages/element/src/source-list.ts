@@ -21,6 +21,7 @@ export interface ListStage {
   readonly frame: ViewerFrame;
   requestFrame(): void;
   splatsChanged(): void;
+  prepareFor(scene: LoadedGaussians): Promise<void>;
   /** Draws what is in the world from now on. Fulfils with the first frame of it. */
   draw(scene: Drawable): Promise<void>;
   /** Nothing is shown any more; the last image stays unless it is to be cleared. */
@@ -68,6 +69,10 @@ export class SourceList implements EntryList {
     this.changed();
   }
 
+  get entries(): readonly SourceEntry[] {
+    return this.#all;
+  }
+
   get members(): readonly Member[] {
     return this.#all.flatMap(({ member }) => member ?? []);
   }
@@ -89,6 +94,7 @@ export class SourceList implements EntryList {
   show(entry: SourceEntry, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void> {
     const show = async (): Promise<void> => {
       if (scene.model) await (await this.meshes.get()).prepare(scene);
+      await this.#stage.prepareFor(scene);
       if (scene.isDestroyed || scene.isLost || entry.scene.scene !== scene || !this.#all.includes(entry)) return;
       scene.onChange = () => this.#stage.requestFrame();
       for (const warning of scene.warnings) this.#stage.warn(`<gaussian-splat>: ${warning}`);

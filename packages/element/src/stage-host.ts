@@ -33,7 +33,7 @@ export interface Source {
 export interface StageHost {
   readonly attributes: Attributes;
   readonly services: Services;
-  readonly source: Source;
+  readonly source: Source & { readonly splatShader?: unknown };
   readonly strings: SpokenStrings;
   readonly liveValues: Omit<LiveState, 'timeSeconds'>;
   part<T extends HTMLElement>(selector: string): T | null;

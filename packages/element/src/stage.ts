@@ -17,6 +17,7 @@ import { RevealController, type RevealHost } from './controllers/reveal-controll
 import { SizeController, windowOf } from './controllers/size-controller.js';
 import { ViewController, type ViewHost } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
+import type { EffectsHost } from './effects/effects.js';
 import type { CameraChangeSource, GaussianSplatEventMap } from './events.js';
 import { isGone } from './gpu/device-failures.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
@@ -31,7 +32,7 @@ import type { LiveWiring } from './live/live-wiring.js';
 import type { QueryHost } from './position-from-point.js';
 import { SourceEntry, type SourceOwner } from './source-entry.js';
 import { SourceList } from './source-list.js';
-import type { Services, Source, StageHost } from './stage-host.js';
+import type { Services, StageHost } from './stage-host.js';
 import { statsOf, type SceneStats } from './stats.js';
 import type { TemplateModel } from './template.js';
 import type { TourHost } from './views/tour.js';
@@ -104,6 +105,12 @@ export class Stage
     sound.update();
     return sound;
   });
+  /** Cuts, how the scene appears, the page's own shader. */
+  readonly effects = new Lazy(
+    'the code of effects',
+    async () => new (await import('./effects/effects.js')).Effects(this as unknown as EffectsHost),
+    this.#update,
+  );
   /** A session shows the scene: the page does not. */
   isImmersed = false;
   /** Puts the frame on paper; fetched after the first frame. */
@@ -179,7 +186,7 @@ export class Stage
     return this.#host.services;
   }
 
-  get source(): Source {
+  get source(): StageHost['source'] {
     return this.#host.source;
   }
 
@@ -313,7 +320,7 @@ export class Stage
 
   /** Fulfils, and never rejects, when nothing is left to wait for, code for attributes and children included. */
   get settled(): Promise<unknown> {
-    const code = [this.#print, this.#composition, this.labels, this.#hands].map(({ settled }) => settled);
+    const code = [this.#print, this.#composition, this.effects, this.labels, this.#hands].map(({ settled }) => settled);
     return Promise.all(code).then(() => this.sources.settled);
   }
 
@@ -353,7 +360,8 @@ export class Stage
   }
 
   get player(): BehaviourHost['player'] {
-    return this.sources.player;
+    const { player } = this.sources;
+    return this.effects.value ? this.effects.value.playerWith(player) : player;
   }
 
   get world(): SourceList['world'] {
@@ -386,6 +394,7 @@ export class Stage
 
   prepareFrame(): string {
     this.sources.place();
+    this.effects.value?.prepareFrame();
     const { layout, changes, placements } = this.sources.world;
     const versions = placements.map(({ scene }) => scene.version).join();
     return `${layout} ${changes} ${versions} ${this.sources.meshes.value?.version ?? ''}`;
@@ -441,6 +450,12 @@ export class Stage
     this.sources.fail(error);
   }
 
+  /** What a scene needs, to be shown as the page wants it from its first frame on. */
+  async prepareFor(scene: LoadedGaussians): Promise<void> {
+    await this.effects.settled;
+    await this.effects.value?.prepareFor(scene);
+  }
+
   /** Draws what is in the world from now on. Fulfils with the first frame of it. */
   draw(scene: Drawable): Promise<void> {
     this.#print.get().catch(this.#warnOf);
@@ -493,6 +508,7 @@ export class Stage
   #lookAtChildren(): void {
     const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
     if (has('splat-scene,splat-mesh')) this.#composition.want(this.#warnOf);
+    if (this.element.querySelector('splat-cut')) this.effects.want(this.#warnOf);
     if (has('[slot^=hotspot-]')) this.labels.want(this.#warnOf);
     if (has('[slot=sound]')) this.#sound.want(this.#warnOf);
     this.#sound.value?.update();
@@ -506,7 +522,8 @@ export class Stage
     if (!this.sources.own.isLeaving) this.playback.keepScene();
     if (this.attributes.views) this.tour.want(this.#warnOf);
     if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
-    const { vr, ar, measure } = this.attributes;
+    const { vr, ar, measure, revealEffect } = this.attributes;
+    if (revealEffect || this.source.splatShader) this.effects.want(this.#warnOf);
     if (vr || ar || measure) this.extras.want(this.#warnOf);
     if (this.input.enabled) this.#hands.want(this.#warnOf);
     this.reveal.settle();

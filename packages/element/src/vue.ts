@@ -1,5 +1,5 @@
 /**
- * Types of `<gaussian-splat>`, `<splat-scene>` and `<splat-mesh>` in Vue's templates: `import type {} from '@gaussian-splat/element/vue'`. Nothing runs; tell Vue's compiler of the
+ * Types of `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in Vue's templates: `import type {} from '@gaussian-splat/element/vue'`. Nothing runs; tell Vue's compiler of the
  * tags with `isCustomElement: (tag) => /^(gaussian-splat|splat-)/.test(tag)`.
  */
 import type { HTMLAttributes, PublicProps } from 'vue';
@@ -8,8 +8,10 @@ import type { GaussianSplatEventMap } from './events.js';
 import type { SettableProperties } from './media.js';
 import type {
   ChildEventMap,
+  SettableCutProperties,
   SettableMeshProperties,
   SettableSceneProperties,
+  SplatCutElement,
   SplatMeshElement,
   SplatSceneElement,
 } from './scenes.js';
@@ -36,5 +38,6 @@ declare module 'vue' {
     'gaussian-splat': CustomElement<GaussianSplatElement, SettableProperties, GaussianSplatEventMap>;
     'splat-scene': CustomElement<SplatSceneElement, SettableSceneProperties, ChildEventMap>;
     'splat-mesh': CustomElement<SplatMeshElement, SettableMeshProperties, ChildEventMap>;
+    'splat-cut': CustomElement<SplatCutElement, SettableCutProperties, object>;
   }
 }

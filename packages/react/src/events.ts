@@ -7,6 +7,7 @@ const EVENTS = {
   onProgress: 'progress',
   onPreview: 'preview',
   onError: 'error',
+  onShaderError: 'shader-error',
   onCameraChange: 'camera-change',
   onPosterDismissed: 'poster-dismissed',
   onInputsChange: 'inputs-change',

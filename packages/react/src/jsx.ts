@@ -1,13 +1,15 @@
 /**
- * Types of the bare tags `<gaussian-splat>`, `<splat-scene>` and `<splat-mesh>` in JSX: `import type {} from '@gaussian-splat/react/jsx'`. React sets its properties; of its
+ * Types of the bare tags `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in JSX: `import type {} from '@gaussian-splat/react/jsx'`. React sets its properties; of its
  * events only those with handlers in small letters arrive (`onload`, `oncamera-change`), so that no other name is taken.
  */
 import type { GaussianSplatElement, GaussianSplatEventMap, SettableProperties } from '@gaussian-splat/element';
 import type * as React from 'react';
 import type {
   ChildEventMap,
+  SettableCutProperties,
   SettableMeshProperties,
   SettableSceneProperties,
+  SplatCutElement,
   SplatMeshElement,
   SplatSceneElement,
 } from '@gaussian-splat/element/scenes.js';
@@ -32,6 +34,7 @@ declare module 'react' {
       'gaussian-splat': Props<GaussianSplatElement, SettableProperties, GaussianSplatEventMap>;
       'splat-scene': Props<SplatSceneElement, SettableSceneProperties>;
       'splat-mesh': Props<SplatMeshElement, SettableMeshProperties>;
+      'splat-cut': Props<SplatCutElement, SettableCutProperties, object>;
     }
   }
 }

@@ -1,16 +1,18 @@
 'use client';
-/** `<splat-scene>` and `<splat-mesh>` for React 18 and 19: children of {@link GaussianSplat}. Only apps that use them bundle them. */
+/** `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` for React 18 and 19: children of {@link GaussianSplat}. Only apps that use them bundle them. */
 import {
+  SplatCutElement,
   SplatMeshElement,
   SplatSceneElement,
   type ChildEventMap,
+  type SettableCutProperties,
   type SettableMeshProperties,
   type SettableSceneProperties,
 } from '@gaussian-splat/element/scenes.js';
 import { createComponent, type EventName } from '@lit/react';
 import * as React from 'react';
 
-export type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
+export type { SplatCutElement, SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 
 const EVENTS = {
   onLoad: 'load',
@@ -70,4 +72,17 @@ export const SplatMesh: React.ForwardRefExoticComponent<SplatMeshProps> = /* @__
   tagName: 'splat-mesh',
   elementClass: SplatMeshElement,
   displayName: 'SplatMesh',
+});
+
+export type SplatCutProps = Omit<React.HTMLAttributes<SplatCutElement>, keyof SettableCutProperties> &
+  SettableCutProperties &
+  React.RefAttributes<SplatCutElement>;
+
+/** A part of space in which splats are hidden or changed: `<SplatCut shape="plane" position={[0, 0.8, 0]} />`. */
+export const SplatCut: React.ForwardRefExoticComponent<SplatCutProps> = /* @__PURE__ */ createComponent({
+  react: React,
+  events: {},
+  tagName: 'splat-cut',
+  elementClass: SplatCutElement,
+  displayName: 'SplatCut',
 });

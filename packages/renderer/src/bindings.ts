@@ -9,7 +9,6 @@ import type { Variants } from './variants.js';
 
 /** The stages before the rasterizer; each is a shader of the same name. */
 export interface Stages {
-  readonly cullChunks: ReturnType<typeof cullChunksStage>;
   readonly plan: ReturnType<typeof planStage>;
   readonly compact: ReturnType<typeof compactStage>;
   readonly sort: SortStage;
@@ -18,18 +17,19 @@ export interface Stages {
 }
 
 interface ReadingStages {
+  readonly cullChunks: ReturnType<typeof cullChunksStage>;
   readonly cull: ReturnType<typeof cullStage>;
   readonly project: ReturnType<typeof projectStage>;
 }
 
 export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threads'>): Stages {
   const readingStages = (kind?: GeometryReading): ReadingStages => ({
+    cullChunks: cullChunksStage(device, kind),
     cull: cullStage(device, threads, kind),
     project: projectStage(device, kind),
   });
   const packed = readingStages();
   return {
-    cullChunks: cullChunksStage(device),
     plan: planStage(device, threads),
     compact: compactStage(device),
     sort: new SortStage(device, threads),
@@ -123,7 +123,8 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
   return table.pages.map((page, i) => {
     const view = table.view(i);
     const gaussians = page.geometry;
-    const reading = stages.reading(page.reading);
+    const reading = stages.reading(table.readingOf(i));
+    const modifiers = table.modifiersOf(i);
     const wishes = table.wishesOf(i);
     // Something must be bound where there are no levels of detail; it is not looked at.
     const details = page.details ?? page.chunks;
@@ -135,15 +136,15 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
         of: wishes,
         note: wishes.bind({ view, chunks: page.chunks, details, chunk_shares: chunkShares }),
       },
-      cullChunks: stages.cullChunks.bind({
-        ...chunk,
+      cullChunks: reading.cullChunks.bind({
+        ...{ ...chunk, ...modifiers },
         chunks: page.chunks,
         group_counts: groupOffsets,
         chunk_shares: chunkShares,
         details,
       }),
       cull: reading.cull.bind({
-        ...chunk,
+        ...{ ...chunk, ...modifiers },
         gaussians,
         group_counts: groupOffsets,
         gathered,
@@ -151,7 +152,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
       }),
       compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
       project: reading.project.bind({
-        ...{ view, gaussians, sh: page.sh, survivors, plan, gathered, splats },
+        ...{ ...modifiers, view, gaussians, sh: page.sh, survivors, plan, gathered, splats },
         keys: keys[0],
         chunk_shares: chunkShares,
       }),

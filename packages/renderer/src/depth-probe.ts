@@ -94,9 +94,10 @@ function recordSurfaces(
 ): void {
   const { order, plan } = scratch;
   table.pages.forEach((page, i) => {
-    const kernel = kernelOf<SurfaceShader>(device, page.reading ? probeSurfaceQuantized : probeSurface);
-    const gaussians = page.geometry;
-    const group = kernel.bind({ view: table.view(i), gaussians, survivors: order[0], plan, points, answers });
+    const plain = page.reading ? probeSurfaceQuantized : probeSurface;
+    const kernel = kernelOf<SurfaceShader>(device, table.readingOf(i)?.probeSurface ?? plain);
+    const bound = { view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, points, answers };
+    const group = kernel.bind({ ...table.modifiersOf(i), ...bound });
     kernel.dispatch(pass, group, count);
   });
 }

@@ -81,8 +81,9 @@ export function recordSurvivors(pass: GPUComputePassEncoder, frame: Pick<Frame, 
 }
 
 /** Finds the visible splats: whole chunks first, then one by one. */
-function cull(pass: GPUComputePassEncoder, { stages, bindings }: Pick<Frame, 'stages' | 'bindings'>): void {
-  for (const { cullChunks, splatCount } of bindings.pages) stages.cullChunks.record(pass, cullChunks, splatCount);
+function cull(pass: GPUComputePassEncoder, { bindings }: Pick<Frame, 'bindings'>): void {
+  for (const { reading, cullChunks, splatCount } of bindings.pages)
+    reading.cullChunks.record(pass, cullChunks, splatCount);
   for (const { reading, cull: bound, splatCount } of bindings.pages) reading.cull.record(pass, bound, splatCount);
 }
 

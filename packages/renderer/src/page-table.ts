@@ -1,5 +1,6 @@
 import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, PageRequests } from './gaussian-scene.js';
+import type { GeometryReading } from './geometry-reading.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
@@ -24,7 +25,7 @@ const EVERYWHERE = {
 const OPAQUE_DEPTH = -Math.log(1e-4);
 
 /** Factor of optical depths with which an opaque surface has a given opacity, as CSS understands it. */
-const opticalFactor = (opacity: number): number => Math.min(1, -Math.log(1 - opacity) / OPAQUE_DEPTH);
+export const opticalFactor = (opacity: number): number => Math.min(1, -Math.log(1 - opacity) / OPAQUE_DEPTH);
 
 /** The pages of the visible scenes of a world, with a `View` uniform for each. */
 export class PageTable {
@@ -80,6 +81,18 @@ export class PageTable {
   /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
   wishesOf(page: number): PageRequests | undefined {
     return this.#placementOf[page].scene.pageRequests;
+  }
+
+  /** What is bound besides where splats are modified. */
+  modifiersOf(page: number): Readonly<Record<string, GPUBuffer>> {
+    const { modifier } = this.#placementOf[page];
+    return modifier ? { modifiers: modifier.values } : {};
+  }
+
+  /** The shaders that read a page; undefined for those of `PackedGaussian`. */
+  readingOf(page: number): GeometryReading | undefined {
+    const { reading } = this.pages[page];
+    return this.#placementOf[page].modifier?.reading(reading) ?? reading;
   }
 
   /** True if a scene is streamed. */

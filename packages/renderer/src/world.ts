@@ -1,5 +1,6 @@
 import { GaussianSplatError, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianScene } from './gaussian-scene.js';
+import type { PlacementModifier } from './geometry-reading.js';
 
 /** An axis-aligned box. */
 export interface Box {
@@ -18,6 +19,8 @@ export interface Placed {
   readonly crop?: Box | undefined;
   /** Default: true. */
   readonly visible?: boolean | undefined;
+  /** Cuts, tints, reveals or moves its splats: a `SplatModifier` of `@gaussian-splat/renderer/modifiers`. */
+  readonly modifier?: PlacementModifier | undefined;
   /** Bounds in the scene's own frame, for {@link boundsOfWorld}. */
   readonly bounds?: Bounds | undefined;
 }
@@ -31,6 +34,7 @@ export class Placement implements Placed {
   #opacity = 1;
   #crop: Box | undefined;
   #visible: boolean;
+  #modifier: PlacementModifier | undefined;
   /** Bounds in the scene's own frame, for {@link boundsOfWorld}. */
   bounds: Bounds | undefined;
 
@@ -43,6 +47,7 @@ export class Placement implements Placed {
     this.opacity = placed.opacity ?? 1;
     this.crop = placed.crop;
     this.#visible = placed.visible ?? true;
+    this.#modifier = placed.modifier;
     this.#onChange = onChange;
   }
 
@@ -95,6 +100,18 @@ export class Placement implements Placed {
     if (visible === this.#visible) return;
     this.#visible = visible;
     this.#onChange(true);
+  }
+
+  /** What cuts, tints, reveals or moves its splats; its pipelines must be there, so that no frame makes them. */
+  get modifier(): PlacementModifier | undefined {
+    return this.#modifier;
+  }
+
+  set modifier(modifier: PlacementModifier | undefined) {
+    // The same one: its values are others.
+    const ofList = modifier !== this.#modifier;
+    this.#modifier = modifier;
+    this.#onChange(ofList);
   }
 }
 

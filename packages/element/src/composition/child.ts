@@ -1,4 +1,4 @@
-import type { Camera, Matrix4, Vector3 } from '@gaussian-splat/core';
+import { multiply, type Camera, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import { ReactiveElement, type PropertyDeclarations } from 'lit';
 import type { Box } from '@gaussian-splat/renderer';
 import { declarations, type Attribute, type Attributes } from '../attributes.js';
@@ -12,7 +12,7 @@ import type { Source } from '../stage-host.js';
 import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
 import type { Member } from '../member.js';
 import { SourceEntry, type EntryStage, type SourceOwner } from '../source-entry.js';
-import { cameraInScene, isSolid, matrixOf, readMatrix, sceneToWorld } from './placing.js';
+import { cameraInScene, isSolid, matrixOf, matrixOfFrame, readMatrix, sceneToWorld, transposed } from './placing.js';
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
 
@@ -39,6 +39,7 @@ export type ChildEventMap = Omit<
   GaussianSplatEventMap,
   | 'camera-change'
   | 'poster-dismissed'
+  | 'shader-error'
   | 'model-visibility'
   | 'contextlost'
   | 'contextrestored'
@@ -197,6 +198,12 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     // Where it will stand, before anything is known of it.
     const matrix = member?.placement.sceneToWorld ?? sceneToWorld(frame, placed, frameOf({ up }, {}));
     return isSolid(matrix) ? cameraInScene(camera, matrix) : camera;
+  }
+
+  /** From the frame of its own children, y up, to the world. @internal */
+  frameToWorld({ scene, placement }: Member): Matrix4 {
+    const own = transposed(matrixOfFrame(frameOf({ up: this.#placed.up }, scene.bounds)));
+    return placement.sceneToWorld ? multiply(placement.sceneToWorld, own) : own;
   }
 
   get #placed(): ChildPlace {

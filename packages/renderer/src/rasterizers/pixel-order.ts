@@ -65,8 +65,10 @@ export class PixelOrder {
   #bindPages({ table, scratch }: FrameBindings): Recorded[] {
     const { order, plan, gathered, keys } = scratch;
     return table.pages.map((page, i) => {
-      const kernel = kernelOf<DepthsShader>(this.#device, page.reading ? pixelDepthsQuantized : pixelDepths);
+      const plain = page.reading ? pixelDepthsQuantized : pixelDepths;
+      const kernel = kernelOf<DepthsShader>(this.#device, table.readingOf(i)?.pixelDepths ?? plain);
       const group = kernel.bind({
+        ...table.modifiersOf(i),
         ...{ view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, gathered },
         ...{ pixel_depths: depthsIn(scratch), keys: keys[0] },
       });

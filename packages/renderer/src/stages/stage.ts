@@ -1,5 +1,5 @@
 import { compact, constants, cullChunks, plan, planSerial } from '../generated/shaders.js';
-import { PACKED, type GeometryReading } from '../geometry-reading.js';
+import { PACKED, type GeometryReading, type Like } from '../geometry-reading.js';
 import { kernelOf, type ComputeKernel, type Resources, type ShaderDescription } from '../gpu/kernel.js';
 
 /**
@@ -35,8 +35,10 @@ const { CHUNK_THREADS, CULL_GROUP, PROJECT_GROUP } = constants;
 export const cullGroups = (splatCount: number): number => Math.ceil(splatCount / CULL_GROUP);
 
 /** In which share each chunk of a page is drawn: 0 where it may hold no visible splat. */
-export const cullChunksStage = (device: GPUDevice): Stage<typeof cullChunks> =>
-  new Stage(device, cullChunks, CULL_GROUP * CHUNK_THREADS);
+export const cullChunksStage = (
+  device: GPUDevice,
+  { cullChunks: own = cullChunks }: GeometryReading = PACKED,
+): Stage<Like<typeof cullChunks>> => new Stage<Like<typeof cullChunks>>(device, own, CULL_GROUP * CHUNK_THREADS);
 
 /** Which splats of the chunks that are drawn paint anything, and how many of each group of 256. */
 export const cullStage = (

@@ -1,0 +1,109 @@
+/** The attributes of `<splat-cut>`, each in one place, as those of `<gaussian-splat>` in ../attributes.ts. */
+import type { Vector3 } from '@gaussian-splat/core';
+import { read } from '../attributes.js';
+import { angleGrammar, keywordGrammar, numberGrammar, parseQuantity, METRES_PER_UNIT } from '../camera/grammar.js';
+import type { AttributeGrammar } from '../camera/grammar.js';
+import { anglesGrammar, pointGrammar, scaleGrammar } from '../composition/grammar.js';
+
+type Numbers = string | number | readonly number[] | null;
+
+/** What a cut does to the splats on its side. */
+export type CutEffect = 'hide' | 'fade' | 'tint' | 'lighten' | 'recolor' | 'displace';
+
+const colorGrammar: AttributeGrammar<Vector3> = {
+  expected: 'a color of CSS, such as tomato or #ff6347',
+  fallback: 'white',
+  parse: parseColor,
+};
+
+/** A color of CSS as three numbers 0..1, sRGB-encoded. */
+function parseColor(text: string): Vector3 | null {
+  const context = document.createElement('canvas').getContext('2d');
+  if (!context || !CSS.supports('color', text)) return null;
+  context.fillStyle = text;
+  context.fillRect(0, 0, 1, 1);
+  const [red, green, blue] = context.getImageData(0, 0, 1, 1).data;
+  return [red / 255, green / 255, blue / 255];
+}
+
+const edgeGrammar: AttributeGrammar<number | 'hard'> = {
+  expected: '"soft", "hard", or a length such as 10cm',
+  fallback: 'soft',
+  parse: (text) => {
+    const word = text.trim().toLowerCase();
+    if (word === 'soft') return 0;
+    if (word === 'hard') return word;
+    const quantity = parseQuantity(word);
+    const meters = quantity && METRES_PER_UNIT[quantity.unit];
+    return meters && quantity.value >= 0 ? quantity.value * meters : null;
+  },
+};
+
+export const CUT_ATTRIBUTES = {
+  /**
+   * `box`, `sphere`, `cylinder` with an upright axis, or `plane`. The first three are 1 m wide and high before `scale`. The inside of a plane is what lies below it.
+   * @default `box`
+   * @example shape="sphere"
+   */
+  shape: read<'box' | 'sphere' | 'cylinder' | 'plane'>(keywordGrammar(['box', 'sphere', 'cylinder', 'plane'])),
+  /**
+   * Where its middle is: x y z in meters of viewer space, or of the scene that it is a child of, y up. The property takes `[x, y, z]` as well.
+   * @default `0 0 0`
+   * @example position="0 0.5m 0"
+   */
+  position: read<Vector3, Numbers>(pointGrammar),
+  /**
+   * Angles about the x, y and z axes, with `deg` or `rad`. z is applied first, then x, then y. The property takes `[x, y, z]` in radians as well.
+   * @default `0 0 0`
+   * @example rotation="0 0 30deg"
+   */
+  rotation: read<Vector3, Numbers>(anglesGrammar),
+  /**
+   * Width, height and depth in meters: one number, or one for each axis.
+   * @default `1`
+   * @example scale="2 1 2"
+   */
+  scale: read<Vector3, Numbers>(scaleGrammar),
+  /**
+   * Which side changes: `inside` of the shape, or all that is `outside`.
+   * @default `inside`
+   * @example side="outside"
+   */
+  side: read<'inside' | 'outside'>(keywordGrammar(['inside', 'outside'])),
+  /**
+   * `soft`: a splat at the edge changes by the share of it that lies on the side. `hard`: its center decides. A length makes the soft edge wider.
+   * @default `soft`
+   * @example edge="10cm"
+   */
+  edge: read<number | 'hard', Numbers>(edgeGrammar),
+  /**
+   * What happens there: `hide`; `fade`, to a surface that lets light through; `tint`, shades of `color`; `lighten`; `recolor`, hues turned by `hue`; `displace`, moved by `offset`.
+   * @default `hide`
+   * @example effect="tint"
+   */
+  effect: read<CutEffect>(keywordGrammar(['hide', 'fade', 'tint', 'lighten', 'recolor', 'displace'])),
+  /**
+   * How much of it, 0 to 1. `lighten` darkens below 0.
+   * @default `1`
+   * @example amount="0.5"
+   */
+  amount: read<number, Numbers>(numberGrammar(1, -1, 'a number from -1 to 1', 1)),
+  /**
+   * Color of `tint`, as in CSS. White leaves shades of gray.
+   * @default `white`
+   * @example color="tomato"
+   */
+  color: read<Vector3>(colorGrammar),
+  /**
+   * Angle by which `recolor` turns hues, as `hue-rotate()` of CSS.
+   * @default `180deg`
+   * @example hue="90deg"
+   */
+  hue: read<number, Numbers>(angleGrammar('180deg')),
+  /**
+   * Where `displace` moves splats: x y z in meters.
+   * @default `0 0 0`
+   * @example offset="0 20cm 0"
+   */
+  offset: read<Vector3, Numbers>(pointGrammar),
+};

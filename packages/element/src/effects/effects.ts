@@ -1,0 +1,305 @@
+/** Loaded where an element has a cut, a reveal effect or a shader of its own. */
+import { multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import {
+  SplatModifier,
+  SplatProgram,
+  type SplatChanges,
+  type SplatCut,
+  type SplatShader,
+} from '@gaussian-splat/renderer/modifiers';
+import type { ReactiveControllerHost } from 'lit';
+import type { ViewerFrame } from '../camera/orbit.js';
+import type { SceneBounds } from '../camera/settings.js';
+import { SplatChild } from '../composition/child.js';
+import { matrixOfFrame, transposed } from '../composition/placing.js';
+import type { MotionHost } from '../controllers/motion-controller.js';
+import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
+import type { GaussianSplatEventMap } from '../events.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { Member } from '../member.js';
+import type { SourceEntry } from '../source-entry.js';
+import { NO_REVEAL, parseReveal, revealedBy, REVEAL_FORM, type RevealEffect } from './reveal.js';
+import { defineCuts, SplatCutElement, showers, type PlacedCut } from './splat-cut.js';
+
+/** What effects ask of their element. */
+export interface EffectsHost {
+  readonly element: ReactiveControllerHost &
+    HTMLElement & { splatShader: SplatShader | null; revealProgress: number | null };
+  readonly attributes: { readonly revealEffect: string | null };
+  readonly frame: ViewerFrame;
+  readonly isOnShow: boolean;
+  readonly sources: {
+    readonly own: SourceEntry;
+    readonly entries: readonly SourceEntry[];
+    readonly bounds: SceneBounds | null;
+    readonly isPreview: boolean;
+    readonly progress: number | null;
+  };
+  readonly behaviours: { add(mover: Mover): void };
+  requestFrame(): void;
+  dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
+  warn(sentence: string): void;
+}
+
+type Player = NonNullable<MotionHost['player']>;
+
+/** Cuts of children, how the scene appears, and the page's own function for splats. */
+export class Effects implements Mover {
+  readonly #host: EffectsHost;
+  /** By device: what draws with the shader as it is now. */
+  #programs = new WeakMap<GPUDevice, SplatProgram>();
+  readonly #compiling = new WeakMap<GPUDevice, Promise<void>>();
+  readonly #modifiers = new Map<Member, SplatModifier>();
+  #cuts: readonly SplatCutElement[] | undefined;
+  #shader: SplatShader | null = null;
+  #refused: SplatShader | null = null;
+  #time = 0;
+  #isPlaying = false;
+  #last: number | undefined;
+  #reveal: RevealEffect = NO_REVEAL;
+  #revealText: string | null = null;
+  /** Of what is revealed. */
+  #url = '';
+  #startedAt: number | undefined;
+  #progress = 0;
+
+  constructor(host: EffectsHost) {
+    this.#host = host;
+    showers.set(host.element, this);
+    defineCuts();
+    host.behaviours.add(this);
+    host.element.addController({ hostUpdated: () => this.#update() });
+    this.#update();
+  }
+
+  cutsChanged(): void {
+    this.#cuts = undefined;
+    this.#host.requestFrame();
+  }
+
+  /** What plays by itself, the page's shader included, for the visitor's switch. */
+  playerWith(other: MotionHost['player']): MotionHost['player'] {
+    if (!this.#shader?.animated) return other;
+    const players: Player[] = [this.#player, ...(other?.canPlay ? [other] : [])];
+    return {
+      canPlay: true,
+      paused: players.every(({ paused }) => paused),
+      play: () => players.forEach((each) => each.play()),
+      pause: () => players.forEach((each) => each.pause()),
+    };
+  }
+
+  get #player(): Player {
+    const turn = (isPlaying: boolean): void => {
+      this.#isPlaying = isPlaying;
+      this.#host.requestFrame();
+      this.#host.element.requestUpdate();
+    };
+    return { canPlay: true, paused: !this.#isPlaying, play: () => turn(true), pause: () => turn(false) };
+  }
+
+  advance(now: number): boolean {
+    const step = Math.min(MAX_MOVER_STEP_MS, now - (this.#last ?? now));
+    this.#last = now;
+    const moves = Boolean(this.#shader?.animated && this.#isPlaying && this.#host.isOnShow);
+    if (moves) this.#time += step / 1000;
+    return this.#advanceReveal(now) || moves;
+  }
+
+  /** Makes what frames of a scene need, before they show it. Never rejects. */
+  async prepareFor(scene: LoadedGaussians): Promise<void> {
+    if (this.#isWanted) await this.#compile(scene);
+  }
+
+  /** Puts all of it into the world, before a frame. */
+  prepareFrame(): void {
+    const { entries, own } = this.#host.sources;
+    this.#restartReveal(own);
+    const members = entries.flatMap(({ member }) => member ?? []);
+    for (const [member, modifier] of this.#modifiers) if (!members.includes(member)) this.#forget(member, modifier);
+    const shared = this.#sharedChanges;
+    for (const { owner, member } of entries) if (member) this.#modify(member, owner.element, shared);
+  }
+
+  get #isReducing(): boolean {
+    return prefersReducedMotion();
+  }
+
+  get #isRevealing(): boolean {
+    return this.#reveal.kind !== 'none' && this.#revealed < 1 && !this.#isReducing;
+  }
+
+  /** How far the scene has appeared, 0..1. */
+  get #revealed(): number {
+    const { revealProgress } = this.#host.element;
+    const own = typeof revealProgress === 'number' && !Number.isNaN(revealProgress) ? revealProgress : this.#progress;
+    return Math.min(1, Math.max(0, own));
+  }
+
+  get #isWanted(): boolean {
+    return this.#isRevealing || this.#shader !== null || this.#children.length > 0;
+  }
+
+  get #children(): readonly SplatCutElement[] {
+    const found = this.#host.element.querySelectorAll(':scope > splat-cut, :scope > splat-scene > splat-cut');
+    return (this.#cuts ??= [...found].filter((each) => each instanceof SplatCutElement));
+  }
+
+  /** What holds for all scenes. */
+  get #sharedChanges(): SplatChanges {
+    const { frame, sources, element } = this.#host;
+    const bounds = this.#isRevealing ? sources.bounds : null;
+    const toWorld = transposed(matrixOfFrame(frame));
+    const reveal = bounds
+      ? revealedBy(this.#reveal, this.#revealed, bounds, directionIn(toWorld, this.#reveal.axis))
+      : {};
+    const cuts = [...this.#cutsOf(element, toWorld), ...(reveal.cuts ?? [])];
+    const uniforms = element.splatShader?.uniforms;
+    return { ...reveal, cuts, time: this.#time, uniforms, worldToViewer: matrixOfFrame(frame) };
+  }
+
+  /** The cuts of a parent, in the world. */
+  #cutsOf(parent: Element, toWorld: Matrix4): SplatCut[] {
+    return this.#children
+      .filter(({ parentElement }) => parentElement === parent)
+      .flatMap(({ cut }) => (cut ? [inWorld(cut, toWorld)] : []));
+  }
+
+  #modify(member: Member, element: HTMLElement, shared: SplatChanges): void {
+    const { placement, scene } = member;
+    const isChild = element !== this.#host.element && element instanceof SplatChild;
+    const own = isChild ? this.#cutsOf(element, element.frameToWorld(member)) : [];
+    const changes = own.length > 0 ? { ...shared, cuts: [...own, ...(shared.cuts ?? [])] } : shared;
+    const { grown = 1, share = 1, cuts = [] } = changes;
+    const isChanged = cuts.length > 0 || grown < 1 || share < 1 || this.#shader !== null;
+    let modifier = this.#modifiers.get(member);
+    if (!isChanged || scene.drawn.pages.length === 0) {
+      if (modifier) this.#forget(member, modifier);
+      return;
+    }
+    if (scene.renderer === 'webgl') return this.#host.warn(NO_WEBGL);
+    const program = this.#programs.get(scene.device);
+    if (!program) return void this.#compile(scene).then(() => this.#host.requestFrame());
+    if (modifier?.program !== program) {
+      modifier?.destroy();
+      this.#modifiers.set(member, (modifier = new SplatModifier(scene.device, program)));
+    }
+    if (modifier.write(changes, placement) || placement.modifier !== modifier) placement.modifier = modifier;
+  }
+
+  #forget(member: Member, modifier: SplatModifier): void {
+    this.#modifiers.delete(member);
+    if (member.placement.modifier === modifier) member.placement.modifier = undefined;
+    modifier.destroy();
+  }
+
+  #compile(scene: LoadedGaussians): Promise<void> {
+    if (scene.renderer === 'webgl') return Promise.resolve();
+    const { device } = scene;
+    const before = this.#compiling.get(device) ?? Promise.resolve();
+    const compiling = before.then(() => this.#compileNow(device, scene));
+    this.#compiling.set(device, compiling);
+    return compiling;
+  }
+
+  async #compileNow(device: GPUDevice, scene: LoadedGaussians): Promise<void> {
+    const shader = this.#shader;
+    const scenes = [scene.drawn];
+    let program: SplatProgram | undefined;
+    try {
+      program = await SplatProgram.compile(device, scenes, shader ?? undefined);
+    } catch (error) {
+      if (shader === this.#shader) this.#refuse(shader, error as Error);
+      program = await SplatProgram.compile(device, scenes).catch(() => undefined);
+    }
+    if (program) this.#programs.set(device, program);
+  }
+
+  /** The scene is drawn without it. */
+  #refuse(shader: SplatShader | null, error: Error): void {
+    if (shader === null) return;
+    this.#shader = null;
+    this.#refused = shader;
+    this.#host.warn(error.message);
+    this.#host.dispatch(new CustomEvent('shader-error', { detail: error }));
+    this.#host.requestFrame();
+  }
+
+  /** The page may have set something else. */
+  #update(): void {
+    const { element, attributes } = this.#host;
+    this.#readReveal(attributes.revealEffect);
+    const shader = element.splatShader ?? null;
+    if (shader === this.#refused) return;
+    if (shader !== this.#shader) this.#useShader(shader);
+  }
+
+  #useShader(shader: SplatShader | null): void {
+    const before = this.#shader;
+    this.#refused = null;
+    this.#shader = shader;
+    if (shader?.animated && !before?.animated) this.#isPlaying = !this.#isReducing;
+    this.#host.requestFrame();
+    // Other values alone need no other program.
+    if (shader && before && isSameCode(shader, before)) return;
+    const scenes = this.#host.sources.entries.flatMap(({ member }) => member?.scene ?? []);
+    // The program at hand draws until the next one is there.
+    if (scenes.length === 0) this.#programs = new WeakMap();
+    for (const scene of scenes) void this.#compile(scene).then(() => this.#host.requestFrame());
+  }
+
+  #readReveal(text: string | null): void {
+    if (text === this.#revealText) return;
+    this.#revealText = text;
+    const effect = parseReveal(text);
+    if (effect === null) this.#host.warn(`<gaussian-splat> reveal-effect: expected ${REVEAL_FORM}, found "${text}".`);
+    this.#reveal = effect ?? NO_REVEAL;
+  }
+
+  /** Another scene appears anew. */
+  #restartReveal(own: SourceEntry): void {
+    const { url } = own.scene;
+    if (url === this.#url) return;
+    this.#url = url;
+    this.#startedAt = undefined;
+    this.#progress = 0;
+  }
+
+  #advanceReveal(now: number): boolean {
+    if (!this.#isRevealing || !this.#host.isOnShow || typeof this.#host.element.revealProgress === 'number')
+      return false;
+    this.#startedAt ??= now;
+    const { isPreview, progress } = this.#host.sources;
+    const byTime = (now - this.#startedAt) / Math.max(1, this.#reveal.milliseconds);
+    // No finer than what has come.
+    this.#progress = this.#reveal.kind === 'detail' && isPreview ? Math.min(byTime, progress ?? 0, 0.95) : byTime;
+    return this.#progress < 1;
+  }
+}
+
+const NO_WEBGL =
+  '<gaussian-splat>: WebGL 2 draws the scene without <splat-cut>, reveal-effect and splatShader, which need WebGPU.';
+
+/** Whether two shaders are one program. */
+const isSameCode = (a: SplatShader, b: SplatShader): boolean => {
+  const of = ({ code, moves, uniforms = {} }: SplatShader): string =>
+    JSON.stringify([code, moves, Object.entries(uniforms).map(([name, value]) => [name, Object(value).length])]);
+  return of(a) === of(b);
+};
+
+/** A cut in the frame of its parent, in the world. */
+function inWorld({ placed, offset, edge, ...cut }: PlacedCut, toWorld: Matrix4): SplatCut {
+  const size = Math.cbrt(Math.abs(determinant(toWorld)));
+  return {
+    ...cut,
+    edge: typeof edge === 'number' ? edge * size : edge,
+    offset: offset && directionIn(toWorld, offset),
+    shapeToWorld: multiply(toWorld, placed),
+  };
+}
+
+const directionIn = (m: Matrix4, [x, y, z]: Vector3): Vector3 =>
+  [0, 1, 2].map((k) => m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z) as unknown as Vector3;
+
+const determinant = (m: Matrix4): number =>
+  m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);

@@ -1,0 +1,79 @@
+/** How a scene appears: the attribute `reveal-effect`, as changes of its splats. */
+import { cross, normalize, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import type { SplatChanges } from '@gaussian-splat/renderer/modifiers';
+import type { SceneBounds } from '../camera/settings.js';
+
+const KINDS = ['none', 'fade', 'grow', 'sweep', 'detail'] as const;
+
+/** What the attribute says. */
+export interface RevealEffect {
+  readonly kind: (typeof KINDS)[number];
+  /** Of `sweep`, in viewer space. */
+  readonly axis: Vector3;
+  readonly milliseconds: number;
+}
+
+const AXES: Readonly<Record<string, Vector3>> = {
+  ...{ x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] },
+  ...{ '-x': [-1, 0, 0], '-y': [0, -1, 0], '-z': [0, 0, -1] },
+};
+const DEFAULT_MS = 1500;
+export const NO_REVEAL: RevealEffect = { kind: 'none', axis: AXES.y, milliseconds: DEFAULT_MS };
+export const REVEAL_FORM = 'none, fade, grow, detail, or sweep with an axis such as -y, and a time such as 2s';
+
+/** The attribute `reveal-effect`: null where it is malformed. */
+export function parseReveal(text: string | null): RevealEffect | null {
+  let effect = NO_REVEAL;
+  for (const term of (text ?? 'none').trim().toLowerCase().split(/\s+/)) {
+    const kind = KINDS.find((each) => each === term);
+    const [, value, unit] = /^(\d*\.?\d+)(m?s)$/.exec(term) ?? [];
+    if (kind) effect = { ...effect, kind };
+    else if (term in AXES) effect = { ...effect, axis: AXES[term] };
+    else if (value) effect = { ...effect, milliseconds: Number(value) * (unit === 's' ? 1000 : 1) };
+    else return null;
+  }
+  return effect;
+}
+
+/** A shape without volume: everything lies outside of it. */
+const NOTHING: Matrix4 = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1];
+/** Least share of the splats that `detail` begins with, as a power of 2. */
+const COARSEST = -6;
+/** Of the radius: standard deviation of the front of `sweep`. */
+const FRONT = 0.05;
+
+/**
+ * What a part of the way is drawn with.
+ * @param progress 0..1
+ * @param bounds of the scene, world
+ * @param axis of `sweep`, world
+ */
+export function revealedBy(
+  { kind }: RevealEffect,
+  progress: number,
+  { center, radius }: Pick<SceneBounds, 'center' | 'radius'>,
+  axis: Vector3,
+): SplatChanges {
+  if (progress >= 1) return {};
+  const eased = progress * progress * (3 - 2 * progress);
+  switch (kind) {
+    case 'none':
+      return {};
+    case 'fade':
+      return { cuts: [{ shape: 'box', side: 'outside', shapeToWorld: NOTHING, surfaceOpacity: eased }] };
+    case 'grow':
+      return { grown: eased, center };
+    case 'detail':
+      return { share: 2 ** (COARSEST * (1 - progress)) };
+    case 'sweep': {
+      const edge = FRONT * radius;
+      const reach = radius + 3 * edge;
+      const front = reach * (2 * eased - 1);
+      const side = normalize(cross(axis, Math.abs(axis[0]) < 0.5 ? [1, 0, 0] : [0, 1, 0]));
+      const other = cross(side, axis);
+      const row = (k: number): number[] => [side[k], axis[k], other[k], center[k] + front * axis[k]];
+      const shapeToWorld = [...row(0), ...row(1), ...row(2), 0, 0, 0, 1];
+      return { cuts: [{ shape: 'plane', side: 'outside', shapeToWorld, opacity: 0, edge }] };
+    }
+  }
+}

@@ -1,0 +1,103 @@
+import { inverse, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import { ModifierCut, Modifiers } from '../generated/modified-layouts.js';
+import { constants } from '../generated/shaders.js';
+import type { GeometryReading, PlacementModifier } from '../geometry-reading.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
+import { writeStruct } from '../gpu/struct.js';
+import type { Placement } from '../world.js';
+import { cutValues, directionIn, type SplatCut } from './cuts.js';
+import type { SplatProgram } from './splat-program.js';
+import type { SplatUniform } from './splat-shader.js';
+
+/** Most cuts of one scene. */
+export const MOST_CUTS: number = constants.MOST_CUTS;
+
+/** What a {@link SplatModifier} does. */
+export interface SplatChanges {
+  /** At most 16. */
+  readonly cuts?: readonly SplatCut[] | undefined;
+  /** How large the scene is by now: 1 for whole, 0 for nothing, about {@link center}. Default: 1. */
+  readonly grown?: number | undefined;
+  /** Where it grows from: world. Default: the origin. */
+  readonly center?: Vector3 | undefined;
+  /** Share of the splats that are drawn, larger for it so that they stand for all: 0 for none, 1 for all. Default: 1. */
+  readonly share?: number | undefined;
+  /** Values of the uniforms of the program's shader. */
+  readonly uniforms?: Readonly<Record<string, SplatUniform>> | undefined;
+  /** Seconds. Default: 0. */
+  readonly time?: number | undefined;
+  /** Rotation from the world to the space that the program's shader reckons in, row-major 4x4. Default: none. */
+  readonly worldToViewer?: Matrix4 | undefined;
+}
+
+const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+
+/** Cuts, tints, reveals and moves the splats of one placement. To change what it does is to write one uniform buffer. */
+export class SplatModifier implements PlacementModifier {
+  readonly values: GPUBuffer;
+  readonly program: SplatProgram;
+  readonly #device: GPUDevice;
+  readonly #bytes = new ArrayBuffer(Modifiers.size);
+  /** What was written last. */
+  readonly #written = new Uint32Array(Modifiers.size / 4);
+
+  constructor(device: GPUDevice, program: SplatProgram) {
+    this.#device = device;
+    this.program = program;
+    const { uniform, copyDestination } = BUFFER_USAGE;
+    this.values = device.createBuffer({
+      label: 'gs.modifiers',
+      size: Modifiers.size,
+      usage: uniform | copyDestination,
+    });
+  }
+
+  reading(kind?: GeometryReading): GeometryReading {
+    return this.program.reading(kind);
+  }
+
+  /** Writes what is to be done, for the frames that are drawn next. @returns whether that is another than before */
+  write(changes: SplatChanges, { scene, sceneToWorld = IDENTITY }: Placement): boolean {
+    const { cuts = [], grown = 1, center = [0, 0, 0], share = 1, time = 0, uniforms = {}, worldToViewer } = changes;
+    const [x, y, z] = scene.origin;
+    const toWorld = multiply(sceneToWorld, [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z, 0, 0, 0, 1]);
+    const toLocal = inverse(toWorld);
+    const toViewer = worldToViewer ? multiply(worldToViewer, toWorld) : toWorld;
+    const fromViewer = inverse(toViewer);
+    const { shader } = this.program;
+    const row = (k: number): Float64Array => toViewer.subarray(4 * k, 4 * k + 4);
+    const column = (k: number): number[] => [fromViewer[k], fromViewer[4 + k], fromViewer[8 + k]];
+    const used = cuts.slice(0, MOST_CUTS);
+    const moves = grown < 1 || share < 1 || used.some(({ offset }) => offset?.some((by) => by !== 0));
+    const moved = directionIn(toLocal, center).map((at, k) => at + toLocal[4 * k + 3]);
+    const values = {
+      ...{ to_viewer_x: row(0), to_viewer_y: row(1), to_viewer_z: row(2) },
+      ...{ from_viewer_x: column(0), from_viewer_y: column(1), from_viewer_z: column(2) },
+      ...{ cut_count: used.length, is_hooked: shader ? 1 : 0, time },
+      ...{ center: moved, grown, share, moves: moves || (shader && shader.moves !== false) ? 1 : 0 },
+      ...{ reserved_a: 0, reserved_b: 0, cuts: [] },
+      values: Object.keys(shader?.uniforms ?? {}).flatMap((name) => fourOf(uniforms[name] ?? shader!.uniforms![name])),
+    };
+    writeStruct(Modifiers, values, this.#bytes);
+    const { offset } = Modifiers.fields.cuts;
+    const { size } = ModifierCut;
+    used.forEach((cut, k) =>
+      writeStruct(ModifierCut, cutValues(cut, toWorld, toLocal), this.#bytes, offset + k * size),
+    );
+    const words = new Uint32Array(this.#bytes);
+    if (words.every((word, k) => word === this.#written[k])) return false;
+    this.#written.set(words);
+    this.#device.queue.writeBuffer(this.values, 0, this.#bytes);
+    return true;
+  }
+
+  destroy(): void {
+    this.values.destroy();
+  }
+}
+
+/** A uniform in a vector of four finite numbers. */
+function fourOf(value: SplatUniform): number[] {
+  const numbers = typeof value === 'number' ? [value] : value;
+  return [0, 1, 2, 3].map((k) => (Number.isFinite(numbers[k]) ? numbers[k] : 0));
+}

@@ -1,0 +1,100 @@
+/** The WGSL function of a page: checked, given names that meet no others, and put behind the function that the stages call. */
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { constants } from '../generated/shaders.js';
+
+/** A uniform of a page's function: a number, or a vector of 2 to 4. */
+export type SplatUniform = number | readonly number[];
+
+/** A function of the page's own, for each splat: see docs/guide/effects.md. */
+export interface SplatShader {
+  /** WGSL with a function `modify(splat: Splat, uniforms: Uniforms) -> Splat`. */
+  readonly code: string;
+  /** Values of the fields of `Uniforms` by name, at most 8. Their names and sizes are part of the code; their values may change in each frame. */
+  readonly uniforms?: Readonly<Record<string, SplatUniform>> | undefined;
+  /** Whether `uniforms.time` goes on by itself. Default: false. */
+  readonly animated?: boolean | undefined;
+  /** Whether positions and sizes change; with false whole chunks out of view are passed over. Default: true. */
+  readonly moves?: boolean | undefined;
+}
+
+const TYPES = ['', 'f32', 'vec2f', 'vec3f', 'vec4f'];
+const sizeOf = (value: SplatUniform): number => (typeof value === 'number' ? 1 : value.length);
+/** What would make an interface with the outside of the module. */
+const FORBIDDEN = /@\s*(group|binding|compute|vertex|fragment|id)\b|\b(enable|requires|override)\s|\bvar\s*</;
+const DECLARED = /\b(?:fn|struct|alias|const)\s+([A-Za-z_]\w*)/g;
+const NAME = /^[A-Za-z]\w*$/;
+
+const refused = (expected: string, found: string, cause?: unknown): GaussianSplatError =>
+  new GaussianSplatError('argument/splat-shader', {
+    where: 'splatShader',
+    ...{ expected, found, cause },
+    remedy: 'see the guide on effects; the scene is drawn without the shader',
+  });
+
+const withoutComments = (code: string): string =>
+  code.replace(/\/\*[^]*?\*\/|\/\/.*/g, (comment) => comment.replace(/[^\n]/g, ' '));
+
+/**
+ * The text of the hook.
+ * @param name of the function that the stages call
+ * @param others the text of a stage, whose names the page's own must not meet
+ * @param mostValues parameters of the array of values
+ * @throws GaussianSplatError `argument/splat-shader`
+ */
+export function hookText({ code, uniforms = {} }: SplatShader, name: string, others: string): string {
+  if (typeof code !== 'string') throw refused('WGSL text in `code`', typeof code);
+  const own = withoutComments(code);
+  const forbidden = FORBIDDEN.exec(own);
+  if (forbidden)
+    throw refused('functions, structs and constants alone', `"${forbidden[0].trim()}"${lineAt(own, forbidden.index)}`);
+  if (!/\bfn\s+modify\s*\(/.test(own)) throw refused('a function `modify`', 'none');
+  const entries = Object.entries(uniforms);
+  if (entries.length > constants.MOST_VALUES)
+    throw refused(`at most ${constants.MOST_VALUES} uniforms`, `${entries.length}`);
+  for (const [key, value] of entries)
+    if (!NAME.test(key) || key === 'time' || !TYPES[sizeOf(value)])
+      throw refused('uniforms that are numbers or vectors of 2 to 4, by names of WGSL other than `time`', `"${key}"`);
+  const fields = entries.map(([key, value]) => `${key}: ${TYPES[sizeOf(value)]},`);
+  const values = entries.map(([, value], k) => `, v[${k}]${['', '.x', '.xy', '.xyz', ''][sizeOf(value)]}`);
+  const most = constants.MOST_VALUES;
+  // The page's text begins a line of its own, so that lines of errors can be counted.
+  return [
+    'struct Splat { position: vec3f, color: vec3f, opacity: f32, scale: f32 }',
+    `struct Uniforms { time: f32, ${fields.join(' ')} }`,
+    `fn ${name}(p: vec3f, c: vec3f, o: f32, t: f32, v: array<vec4f, ${most}>) -> mat3x3f {`,
+    `let s = page_modify(Splat(p, c, o, 1.0), Uniforms(t${values.join('')}));`,
+    'return mat3x3f(s.position, s.color, vec3f(s.opacity, s.scale, 0.0));',
+    '}',
+    renamed(own, others),
+  ].join('\n');
+}
+
+/** Lines before the page's own text in {@link hookText}. */
+const LINES_BEFORE = 6;
+
+/** With other names in place of those that a page declares and the stage's text has, too. */
+function renamed(own: string, others: string): string {
+  const words = new Set(others.match(/[A-Za-z_]\w*/g));
+  const declared = new Set([...own.matchAll(DECLARED)].map(([, name]) => name));
+  const met = [...declared].filter((name) => name === 'modify' || words.has(name));
+  return met.reduce((text, name) => text.replace(new RegExp(`(?<![.\\w])${name}\\b`, 'g'), `page_${name}`), own);
+}
+
+const lineAt = (text: string, index: number): string => ` in line ${text.slice(0, index).split('\n').length}`;
+
+/**
+ * Compiles a stage with a hook, and says what is wrong with it.
+ * @param before the stage's text before the hook's
+ * @throws GaussianSplatError `argument/splat-shader` that names the line of the page's text
+ */
+export async function requireCompiles(device: GPUDevice, code: string, before: string): Promise<void> {
+  device.pushErrorScope('validation');
+  const module = device.createShaderModule({ label: 'gs.splat_shader', code });
+  const error = device.popErrorScope().catch(() => null);
+  const { messages } = await module.getCompilationInfo();
+  const first = messages.find(({ type }) => type === 'error');
+  if (!first && (await error) === null) return;
+  const line = (first?.lineNum ?? 0) - before.split('\n').length + 1 - LINES_BEFORE;
+  const place = line > 0 ? ` in line ${line}` : '';
+  throw refused('WGSL that compiles', `${(first?.message ?? (await error)?.message ?? '').trim()}${place}`);
+}

@@ -1,0 +1,119 @@
+// Splats as a page wants them: cuts, then the page's own function, then how the scene appears. Variants of the stages that read Gaussians (`cull_modified` of
+// `cull` and so on: scripts/build-shaders.mjs) call these functions in place of `unpack_gaussian` and `pack_splat`.
+#import shared/cut
+#import shared/splat_hook
+#import shared/stored_gaussian
+#import shared/scene_opacity
+#import shared/splat
+
+// Splats that stand for more than themselves are larger, to a limit.
+const COARSEST_SHARE = 0.015625;
+// Share of the reveal in which one splat appears.
+const SHARE_RAMP = 0.1;
+// Bits of a length that squares to a number.
+const FARTHEST_BITS = 0x5d000000u;
+const LARGEST_SCALE = 1000.0;
+// A splat without a size has no image.
+const SMALLEST_SCALE = 1e-4;
+
+// Of the splat at hand: shares that the cuts change, and what the page's function was given.
+var<private> cut_shares: array<f32, MOST_CUTS>;
+var<private> hooked_position: vec3f;
+var<private> hooked_opacity: f32;
+var<private> visible_opacity: f32;
+
+// Nothing that a page computes may spread: no infinity, no number beyond bounds.
+fn is_bounded(x: f32) -> bool {
+  return (bitcast<u32>(x) & 0x7fffffffu) < FARTHEST_BITS;
+}
+
+fn bounded(x: f32, otherwise: f32, low: f32, high: f32) -> f32 {
+  if (!is_bounded(x)) { return otherwise; }
+  return clamp(x, low, high);
+}
+
+fn scale_gaussian(g: ptr<function, Gaussian>, factor: f32) {
+  (*g).factor_x *= factor;
+  (*g).factor_y *= factor;
+  (*g).factor_z *= factor;
+}
+
+fn apply_cuts(g: ptr<function, Gaussian>) {
+  let found = *g;
+  for (var k = 0u; k < modifiers.cut_count; k++) {
+    let share = share_cut(modifiers.cuts[k], found);
+    cut_shares[k] = share;
+    (*g).opacity *= mix(1.0, modifiers.cuts[k].opacity, share);
+    (*g).opacity = thinned_opacity((*g).opacity, mix(1.0, modifiers.cuts[k].thinned, share));
+    (*g).position += share * modifiers.cuts[k].offset;
+  }
+}
+
+fn hook_values(color: vec3f) -> mat3x3f {
+  return splat_hook(hooked_position, color, hooked_opacity, modifiers.time, modifiers.values);
+}
+
+// Position and size. An opacity that is lower follows with the color, on which it may depend.
+fn apply_hook(g: ptr<function, Gaussian>) {
+  if (modifiers.is_hooked == 0u) { return; }
+  let p = vec4f((*g).position, 1.0);
+  hooked_position = vec3f(dot(modifiers.to_viewer_x, p), dot(modifiers.to_viewer_y, p), dot(modifiers.to_viewer_z, p));
+  hooked_opacity = (*g).opacity;
+  let wanted = hook_values(vec3f(0.0));
+  let moved = wanted[0] - hooked_position;
+  if (is_bounded(moved.x) && is_bounded(moved.y) && is_bounded(moved.z)) {
+    (*g).position += moved.x * modifiers.from_viewer_x + moved.y * modifiers.from_viewer_y + moved.z * modifiers.from_viewer_z;
+  }
+  scale_gaussian(g, bounded(wanted[2].y, 1.0, SMALLEST_SCALE, LARGEST_SCALE));
+  (*g).opacity = max((*g).opacity, bounded(wanted[2].x, 0.0, 0.0, 1.0));
+  visible_opacity = (*g).opacity;
+}
+
+// 0..1, always the same for a position.
+fn random_of(position: vec3f) -> f32 {
+  let bits = bitcast<vec3u>(position) * vec3u(0x9e3779b1u, 0x85ebca77u, 0xc2b2ae3du);
+  var h = bits.x ^ (bits.y >> 7u) ^ (bits.z << 9u);
+  h = (h ^ (h >> 15u)) * 0x2c1b3c6du;
+  h = (h ^ (h >> 12u)) * 0x297a2d39u;
+  return f32((h ^ (h >> 15u)) >> 8u) / 16777216.0;
+}
+
+fn apply_reveal(g: ptr<function, Gaussian>) {
+  if (modifiers.share < 1.0) {
+    let share = max(modifiers.share, COARSEST_SHARE);
+    (*g).opacity *= clamp((share * (1.0 + SHARE_RAMP) - random_of((*g).position)) / SHARE_RAMP, 0.0, 1.0);
+    scale_gaussian(g, inverseSqrt(share));
+  }
+  if (modifiers.grown < 1.0) {
+    (*g).position = modifiers.center + modifiers.grown * ((*g).position - modifiers.center);
+    scale_gaussian(g, max(modifiers.grown, SMALLEST_SCALE));
+    if (modifiers.grown <= 0.0) { (*g).opacity = 0.0; }
+  }
+}
+
+fn modified_gaussian(found: FoundGaussian) -> Gaussian {
+  var g = unpack_gaussian(found);
+  apply_cuts(&g);
+  apply_hook(&g);
+  apply_reveal(&g);
+  return g;
+}
+
+// With the colors that `modified_gaussian` did not know.
+fn pack_modified(ellipse: Ellipse, color: vec3f) -> ProjectedSplat {
+  var e = ellipse;
+  var c = color;
+  for (var k = 0u; k < modifiers.cut_count; k++) {
+    if (modifiers.cuts[k].has_color == 0u) { continue; }
+    let before = vec4f(c, 1.0);
+    let after = vec3f(dot(modifiers.cuts[k].red, before), dot(modifiers.cuts[k].green, before), dot(modifiers.cuts[k].blue, before));
+    c = mix(c, after, cut_shares[k]);
+  }
+  if (modifiers.is_hooked != 0u) {
+    let wanted = hook_values(c);
+    let opacity = bounded(wanted[2].x, 0.0, 0.0, 1.0);
+    e.opacity *= opacity / max(visible_opacity, 1e-6);
+    c = vec3f(bounded(wanted[1].x, 0.0, 0.0, COLOR_MAX), bounded(wanted[1].y, 0.0, 0.0, COLOR_MAX), bounded(wanted[1].z, 0.0, 0.0, COLOR_MAX));
+  }
+  return pack_splat(e, c);
+}

@@ -1,0 +1,65 @@
+// What a page does to the splats of a scene while they are projected. packages/renderer/src/modifiers writes it, in page-local coordinates.
+#import shared/view
+
+const MOST_CUTS = 16u;
+const MOST_VALUES = 8u;
+// Shapes of a cut, in their own coordinates: sides and diameters are 1, and the plane is y = 0.
+const CUT_BOX = 0u;
+const CUT_SPHERE = 1u;
+const CUT_CYLINDER = 2u;
+const CUT_PLANE = 3u;
+
+struct ModifierCut {
+  // Rows of the affine map to the shape's coordinates.
+  to_shape_x: vec4f,
+  to_shape_y: vec4f,
+  to_shape_z: vec4f,
+  // Rows of an affine map of colors.
+  red: vec4f,
+  green: vec4f,
+  blue: vec4f,
+  // Displacement.
+  offset: vec3f,
+  shape: u32,
+  // Factor of the opacity.
+  opacity: f32,
+  // Factor of the optical depth (shared/scene_opacity).
+  thinned: f32,
+  // Standard deviation of the edge besides that of the splat; below 0 the center alone decides.
+  edge: f32,
+  // 1 if the cut changes what lies outside of its shape.
+  is_outside: u32,
+  // 1 if it changes colors.
+  has_color: u32,
+  reserved_a: u32,
+  reserved_b: u32,
+  reserved_c: u32,
+}
+
+struct Modifiers {
+  // Rows of the affine map to viewer space, and columns of the inverse of its linear part.
+  to_viewer_x: vec4f,
+  to_viewer_y: vec4f,
+  to_viewer_z: vec4f,
+  from_viewer_x: vec3f,
+  cut_count: u32,
+  from_viewer_y: vec3f,
+  // 1 if the page has a function of its own.
+  is_hooked: u32,
+  from_viewer_z: vec3f,
+  // Seconds.
+  time: f32,
+  // Where the scene grows from, and how large it is by now: 1 for whole.
+  center: vec3f,
+  grown: f32,
+  // Share of the splats that stand for all: 1 for all of them.
+  share: f32,
+  // 1 if splats may be elsewhere, or larger, than their chunks say.
+  moves: u32,
+  reserved_a: u32,
+  reserved_b: u32,
+  values: array<vec4f, MOST_VALUES>,
+  cuts: array<ModifierCut, MOST_CUTS>,
+}
+
+@group(0) @binding(9) var<uniform> modifiers: Modifiers;

@@ -1,0 +1,186 @@
+/** What a page does to splats: `<splat-cut>`, `reveal-effect` and `splatShader`. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import {
+  assert,
+  assertEqual,
+  atRest,
+  COMPASS,
+  delay,
+  FIXTURES,
+  frames,
+  nextEvent,
+  showLoaded,
+  until,
+} from './support/harness.js';
+import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
+
+const VIEW = {
+  'camera-orbit': '0deg 90deg 10m',
+  'camera-target': '0 0 0',
+  'field-of-view': '45deg',
+  quality: 'default',
+};
+
+const isColored = (color: Rgb): boolean => isRed(color) || isGreen(color) || isBlue(color);
+const countOf = async (element: Element, isPicked: (color: Rgb) => boolean): Promise<number> =>
+  (await screenOf(element)).middleOf(isPicked)?.count ?? 0;
+
+/** Adds a cut, and waits until it acts. */
+async function cut(parent: Element, attributes: Readonly<Record<string, string>>): Promise<HTMLElement> {
+  const child = document.createElement('splat-cut');
+  for (const [name, value] of Object.entries(attributes)) child.setAttribute(name, value);
+  parent.append(child);
+  const element = parent.closest('gaussian-splat')!;
+  await customElements.whenDefined('splat-cut');
+  await until(() => stageOf(element).sources.world.placements.some(({ modifier }) => modifier), 'the cut acts');
+  await frames(3);
+  return child;
+}
+
+interface Inside {
+  readonly stage: {
+    readonly sources: { readonly world: { readonly placements: readonly { readonly modifier: unknown }[] } };
+  };
+}
+const stageOf = (element: GaussianSplatElement): Inside['stage'] => (element as unknown as Inside).stage;
+
+it('a cut hides what is inside or outside, moves without a pipeline or a buffer, and goes again', async () => {
+  const element = await showLoaded(VIEW);
+  const whole = [await countOf(element, isRed), await countOf(element, isGreen)];
+  assert(
+    whole.every((count) => count > 0),
+    `red and green are seen: ${whole.join()}`,
+  );
+  const child = (await cut(element, { shape: 'box', scale: '100', position: '51 0 0' })) as HTMLElement & {
+    position: number[];
+  };
+  const right = await screenOf(element);
+  const hidden = right.middleOf(isColored);
+  assert(hidden !== null && hidden.x < 60, 'what is right of the middle is hidden');
+  let made = 0;
+  const prototypes = [
+    [GPUDevice.prototype, 'createBuffer'],
+    [GPUDevice.prototype, 'createComputePipeline'],
+    [GPUDevice.prototype, 'createComputePipelineAsync'],
+    [GPUDevice.prototype, 'createBindGroup'],
+  ] as const;
+  const before = prototypes.map(([of, name]) => of[name]);
+  prototypes.forEach(([of, name], k) => {
+    (of as unknown as Record<string, unknown>)[name] = function (this: GPUDevice, ...rest: unknown[]): unknown {
+      made++;
+      return (before[k] as (...all: unknown[]) => unknown).apply(this, rest);
+    };
+  });
+  try {
+    for (let step = 0; step < 5; step++) {
+      child.position = [51 - step, 0, 0];
+      await frames(2);
+    }
+  } finally {
+    prototypes.forEach(([of, name], k) => ((of as unknown as Record<string, unknown>)[name] = before[k]));
+  }
+  assertEqual(made, 0, 'buffers, bind groups and pipelines made while a cut moves');
+  child.setAttribute('side', 'outside');
+  child.position = [51, 0, 0];
+  await frames(3);
+  const left = (await screenOf(element)).middleOf(isColored);
+  assert(left !== null && left.x > 60, 'now what is left of it is');
+  child.remove();
+  await frames(3);
+  assertEqual([await countOf(element, isRed), await countOf(element, isGreen)].join(), whole.join(), 'all is back');
+});
+
+it('picking does not find what a cut hides', async () => {
+  const element = await showLoaded(VIEW);
+  const middle = (await screenOf(element)).middleOf(isRed)!;
+  const { left, top } = element.getBoundingClientRect();
+  const pick = (): Promise<unknown> => element.positionFromPoint(left + middle.x, top + middle.y);
+  assert((await pick()) !== null, 'red is found');
+  await cut(element, { shape: 'sphere', scale: '100' });
+  assertEqual(await pick(), null, 'nothing is found');
+});
+
+it('a cut in a <splat-scene> is for that scene alone, in its frame', async () => {
+  const element = await showLoaded({ ...VIEW, src: `${FIXTURES}green.splat` });
+  const child = document.createElement('splat-scene');
+  child.setAttribute('src', COMPASS);
+  element.append(child);
+  await until(() => (child as HTMLElement & { loaded?: boolean }).loaded === true, 'the child');
+  assert((await countOf(element, isRed)) > 0, 'red is seen');
+  const green = await countOf(element, isGreen);
+  await cut(child, { shape: 'sphere', scale: '100' });
+  assertEqual(await countOf(element, isRed), 0, 'red');
+  const left = await countOf(element, isGreen);
+  assert(left > 0 && left <= green, 'the element’s own scene stays');
+});
+
+it('a cut tints', async () => {
+  const element = await showLoaded(VIEW);
+  await cut(element, { shape: 'sphere', scale: '100', effect: 'recolor', hue: '120deg' });
+  assert((await countOf(element, isRed)) === 0 || (await countOf(element, isGreen)) > 0, 'hues are turned');
+  await cut(element, { shape: 'sphere', scale: '100', effect: 'tint', color: 'white' });
+  assertEqual(await countOf(element, isColored), 0, 'shades of gray');
+});
+
+it('a scene appears by the progress of the page, and by time', async () => {
+  const element = await showLoaded({ ...VIEW, 'reveal-effect': 'fade' });
+  element.revealProgress = 0;
+  await frames(4);
+  assertEqual(await countOf(element, isColored), 0, 'nothing at 0');
+  element.revealProgress = 1;
+  await frames(4);
+  const whole = await countOf(element, isColored);
+  assert(whole > 0, 'all at 1');
+  for (const effect of ['grow', 'sweep x', 'detail']) {
+    element.setAttribute('reveal-effect', effect);
+    element.revealProgress = 0.3;
+    await frames(4);
+    const part = await screenOf(element);
+    element.revealProgress = 1;
+    await frames(4);
+    assert((await screenOf(element)).differences(part, 8) > 0, `${effect} is seen on the way`);
+    assertEqual(await countOf(element, isColored), whole, `${effect} ends with all of it`);
+  }
+  const timed = await showLoaded({ ...VIEW, 'reveal-effect': 'sweep x 300ms' });
+  await delay(600);
+  await atRest(timed);
+  assertEqual(await countOf(timed, isColored), whole, 'after its time');
+});
+
+it('a function of the page changes splats; a wrong one is told of by its line, and the scene stays', async () => {
+  const element = await showLoaded(VIEW);
+  const whole = await countOf(element, isColored);
+  const told = nextEvent<CustomEvent<{ code: string; message: string }>>(element, 'shader-error');
+  const { warn } = console;
+  console.warn = () => undefined;
+  element.splatShader = {
+    code: 'fn modify(splat: Splat, uniforms: Uniforms) -> Splat {\n  var s = splat;\n  s.colour = vec3f(0.0);\n  return s;\n}',
+  };
+  const { detail } = await told;
+  console.warn = warn;
+  assertEqual(detail.code, 'argument/splat-shader', 'code');
+  assert(detail.message.includes('in line 3'), detail.message);
+  assertEqual(await countOf(element, isColored), whole, 'the scene without it');
+  const gray = (by: string): string =>
+    `fn helper(c: vec3f) -> vec3f { return vec3f(dot(c, vec3f(0.333))); }
+    fn modify(splat: Splat, uniforms: Uniforms) -> Splat { var s = splat; s.color = mix(s.color, helper(s.color), uniforms.amount)${by}; return s; }`;
+  element.splatShader = { code: gray(''), uniforms: { amount: 1 } };
+  await until(() => stageOf(element).sources.world.placements.some(({ modifier }) => modifier), 'the function acts');
+  await frames(4);
+  assertEqual(await countOf(element, isColored), 0, 'gray');
+  element.splatShader = { code: gray(''), uniforms: { amount: 0 } };
+  await frames(4);
+  assertEqual(await countOf(element, isColored), whole, 'the values alone are others');
+  // 1 / 0 and 0 / 0 in all that it returns.
+  element.splatShader = {
+    code: `fn modify(splat: Splat, uniforms: Uniforms) -> Splat { let x = 1.0 / uniforms.zero; return Splat(splat.position + vec3f(x), vec3f(x - x), x - x, x); }`,
+    uniforms: { zero: 0 },
+  };
+  await delay(1500);
+  await frames(4);
+  assert(element.loaded && element.error === null, 'the device is still there');
+  element.splatShader = null;
+  await frames(4);
+  assertEqual(await countOf(element, isColored), whole, 'without it all is as before');
+});
