@@ -52,7 +52,7 @@ it('a cut hides what is inside or outside, moves without a pipeline or a buffer,
     whole.every((count) => count > 0),
     `red and green are seen: ${whole.join()}`,
   );
-  const child = (await cut(element, { shape: 'box', scale: '100', position: '51 0 0' })) as HTMLElement & {
+  const child = (await cut(element, { shape: 'box', scale: '100', position: '50.5 0 0' })) as HTMLElement & {
     position: number[];
   };
   const right = await screenOf(element);
@@ -74,7 +74,7 @@ it('a cut hides what is inside or outside, moves without a pipeline or a buffer,
   });
   try {
     for (let step = 0; step < 5; step++) {
-      child.position = [51 - step, 0, 0];
+      child.position = [50.5 - step, 0, 0];
       await frames(2);
     }
   } finally {
@@ -82,7 +82,7 @@ it('a cut hides what is inside or outside, moves without a pipeline or a buffer,
   }
   assertEqual(made, 0, 'buffers, bind groups and pipelines made while a cut moves');
   child.setAttribute('side', 'outside');
-  child.position = [51, 0, 0];
+  child.position = [50.5, 0, 0];
   await frames(3);
   const left = (await screenOf(element)).middleOf(isColored);
   assert(left !== null && left.x > 60, 'now what is left of it is');
