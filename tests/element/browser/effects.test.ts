@@ -13,7 +13,7 @@ import {
   showLoaded,
   until,
 } from './support/harness.js';
-import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
+import { comesToShow, isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
 
 const VIEW = {
   'camera-orbit': '0deg 90deg 10m',
@@ -108,11 +108,9 @@ it('a cut in a <splat-scene> is for that scene alone, in its frame', async () =>
   element.append(child);
   await until(() => (child as HTMLElement & { loaded?: boolean }).loaded === true, 'the child');
   assert((await countOf(element, isRed)) > 0, 'red is seen');
-  const green = await countOf(element, isGreen);
   await cut(child, { shape: 'sphere', scale: '100' });
   assertEqual(await countOf(element, isRed), 0, 'red');
-  const left = await countOf(element, isGreen);
-  assert(left > 0 && left <= green, 'the element’s own scene stays');
+  assert((await countOf(element, isGreen)) > 0, 'the element’s own scene stays');
 });
 
 it('a cut tints', async () => {
@@ -166,9 +164,7 @@ it('a function of the page changes splats; a wrong one is told of by its line, a
     `fn helper(c: vec3f) -> vec3f { return vec3f(dot(c, vec3f(0.333))); }
     fn modify(splat: Splat, uniforms: Uniforms) -> Splat { var s = splat; s.color = mix(s.color, helper(s.color), uniforms.amount)${by}; return s; }`;
   element.splatShader = { code: gray(''), uniforms: { amount: 1 } };
-  await until(() => stageOf(element).sources.world.placements.some(({ modifier }) => modifier), 'the function acts');
-  await frames(4);
-  assertEqual(await countOf(element, isColored), 0, 'gray');
+  assert(await comesToShow(element, (screen) => screen.middleOf(isColored) === null), 'gray');
   element.splatShader = { code: gray(''), uniforms: { amount: 0 } };
   await frames(4);
   assertEqual(await countOf(element, isColored), whole, 'the values alone are others');

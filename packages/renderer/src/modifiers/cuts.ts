@@ -29,6 +29,14 @@ export interface SplatCut {
   readonly offset?: Vector3 | undefined;
 }
 
+/** Each by its name: an access by a computed one would keep all constants in the bundle. */
+const NUMBERS: Readonly<Record<CutShape, number>> = {
+  box: constants.CUT_BOX,
+  sphere: constants.CUT_SPHERE,
+  cylinder: constants.CUT_CYLINDER,
+  plane: constants.CUT_PLANE,
+};
+
 /** In place of the map to a shape that has no volume: everything lies outside. */
 const NOWHERE = [0, 0, 0, 1e6];
 
@@ -46,7 +54,7 @@ export function cutValues(cut: SplatCut, toWorld: Matrix4, toLocal: Matrix4): St
     ...{ to_shape_x: row(0), to_shape_y: row(1), to_shape_z: row(2) },
     ...{ red: color.slice(0, 4), green: color.slice(4, 8), blue: color.slice(8, 12) },
     offset: directionIn(toLocal, offset),
-    shape: constants[`CUT_${shape.toUpperCase() as Uppercase<CutShape>}`],
+    shape: NUMBERS[shape],
     opacity,
     thinned: opticalFactor(surfaceOpacity),
     edge: edge === 'hard' ? -1 : edge * sizeOf(toLocal),
