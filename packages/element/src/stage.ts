@@ -360,8 +360,7 @@ export class Stage
   }
 
   get player(): BehaviourHost['player'] {
-    const { player } = this.sources;
-    return this.effects.value ? this.effects.value.playerWith(player) : player;
+    return this.effects.value?.playerWith(this.sources.player) ?? this.sources.player;
   }
 
   get world(): SourceList['world'] {

@@ -70,6 +70,8 @@ export class Effects implements Mover {
     host.behaviours.add(this);
     host.element.addController({ hostUpdated: () => this.#update() });
     this.#update();
+    // What was there before this code asks for nothing.
+    host.requestFrame();
   }
 
   cutsChanged(): void {
@@ -230,7 +232,7 @@ export class Effects implements Mover {
     const { element, attributes } = this.#host;
     this.#readReveal(attributes.revealEffect);
     const shader = element.splatShader ?? null;
-    if (shader === this.#refused) return;
+    if (shader !== null && shader === this.#refused) return;
     if (shader !== this.#shader) this.#useShader(shader);
   }
 
