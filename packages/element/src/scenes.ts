@@ -4,7 +4,8 @@
  */
 import './index.js';
 import { define } from './composition/compose.js';
-import { defineCuts, type SplatCutElement } from './effects/splat-cut.js';
+import { defineCuts } from './effects/define.js';
+import type { SplatCutElement } from './effects/splat-cut.js';
 
 import type { CUT_ATTRIBUTES } from './effects/attributes.js';
 import type { MESH_ATTRIBUTES, PropertiesOf, SCENE_ATTRIBUTES } from './composition/attributes.js';

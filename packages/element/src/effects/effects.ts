@@ -18,8 +18,9 @@ import type { GaussianSplatEventMap } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { Member } from '../member.js';
 import type { SourceEntry } from '../source-entry.js';
+import { defineCuts } from './define.js';
 import { NO_REVEAL, parseReveal, revealedBy, REVEAL_FORM, type RevealEffect } from './reveal.js';
-import { defineCuts, SplatCutElement, showers, type PlacedCut } from './splat-cut.js';
+import { SplatCutElement, showers, type PlacedCut } from './splat-cut.js';
 
 /** What effects ask of their element. */
 export interface EffectsHost {

@@ -131,12 +131,6 @@ export class SplatCutElement extends ReactiveElement {
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging, @typescript-eslint/no-empty-object-type
 export interface SplatCutElement extends PropertiesOf<typeof CUT_ATTRIBUTES> {}
 
-/** Registers the tag. */
-export function defineCuts(): void {
-  if (globalThis.customElements && !customElements.get('splat-cut'))
-    customElements.define('splat-cut', SplatCutElement);
-}
-
 declare global {
   interface HTMLElementTagNameMap {
     'splat-cut': SplatCutElement;
