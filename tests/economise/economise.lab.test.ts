@@ -12,7 +12,9 @@ import {
   type Vector3,
 } from '@gaussian-splat/core';
 import {
+  dealOwnViews,
   dealtViewsAround,
+  dealtViewsOfVisitors,
   dealViews,
   decibels,
   economise,
@@ -314,6 +316,39 @@ test('between cameras there are views that are no camera, each halfway to its ne
     }
   }
   assert.deepEqual(viewsBetween(cameras.slice(0, 1)), []);
+});
+
+/** Whether a view is a part of a frame of 1920 x 1080 pixels. */
+const isExcerpt = ({ width, height, fx, cx, cy }: Camera): boolean =>
+  // The frame's middle is the principal point: 960 and 540 pixels from its edges.
+  Math.abs(fx - 540 / Math.tan(0.35)) < 1 && 960 - cx >= -1 && cx + 960 >= width - 1 && cy + 540 >= height - 1;
+
+test('errors are measured at the size people look at, from where visitors may go, in views that scored nothing', () => {
+  const bounds = boundsOf(scene);
+  const { scored, searched, heldOut } = dealtViewsOfVisitors(bounds, 24);
+  assert.deepEqual([scored.length, searched.length, heldOut.length], [24, 8, 24]);
+  for (const view of [...searched, ...heldOut]) {
+    validateCamera(view);
+    assert.deepEqual([view.width, view.height], [640, 360]);
+    assert.ok(isExcerpt(view), JSON.stringify(view));
+  }
+  const eyes = heldOut.map(({ worldToCamera }) => eyeOf(worldToCamera).map((v, k) => v - bounds.center[k]));
+  const distances = eyes.map((eye) => Math.hypot(...eye) / bounds.radius);
+  assert.ok(Math.min(...distances) < 0.6 && Math.max(...distances) > 3, `distances ${distances.join()}`);
+  const heights = eyes.map((eye) => -eye[1] / Math.hypot(...eye));
+  assert.ok(Math.min(...heights) < -0.7 && Math.max(...heights) > 0.7, `from below and above: ${heights.join()}`);
+  const all = [...scored, ...searched, ...heldOut].map(({ worldToCamera }) => worldToCamera.join());
+  assert.equal(new Set(all).size, 56);
+});
+
+test('cameras of a file are judged between neighbors, too, and small ones are scored in more pixels', () => {
+  const cameras = viewsAround(boundsOf(scene), 40, { width: 160, height: 90 });
+  const { scored, heldOut } = dealOwnViews(cameras);
+  assert.ok(scored.every(({ width, height }) => width * height >= 480 * 270 - 500));
+  const own = new Set(cameras.map(({ worldToCamera }) => worldToCamera.join()));
+  const between = heldOut.filter(({ worldToCamera }) => !own.has(worldToCamera.join()));
+  assert.ok(heldOut.length - between.length === 8 && between.length >= 4, `${between.length} of ${heldOut.length}`);
+  assert.ok(heldOut.every(isExcerpt));
 });
 
 test('between cameras of one place that look in opposite directions there is no view', () => {

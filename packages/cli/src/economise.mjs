@@ -3,8 +3,8 @@ import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { boundsOf, cameraFromCalibration } from '@gaussian-splat/core';
 import {
-  dealtViewsAround,
-  dealViews,
+  dealOwnViews,
+  dealtViewsOfVisitors,
   economise,
   economiseWithin,
   encodingsFor,
@@ -14,7 +14,6 @@ import {
   isLodIndex,
   MergingEvaluator,
   RefiningEvaluator,
-  viewsBetween,
 } from '@gaussian-splat/economise';
 import { inline } from '@gaussian-splat/economise/parts';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
@@ -33,8 +32,9 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [opt
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to 40 to 50 dB) or .ply
                   FOLDER/lod-meta.json: streamed SOG, the same in files by level of detail, in an empty folder or one that does not exist yet
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
-                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
-                  Larger ones are drawn with 1600 pixels a side
+                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views of the subject, 0.5 to 3.2 radii from its
+                  middle and up to 67° above and below, 24 of them held out. Errors are measured in excerpts of frames of as many pixels as 1920 x 1080, and of
+                  views of a file in those between neighbors, too. Views of over 1600 pixels a side are drawn with these
   --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
   --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
   --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
@@ -144,9 +144,19 @@ function readViews(path) {
   const drawn = cameras.map(atMostLargest);
   const smaller = drawn.filter((camera, k) => camera !== cameras[k]).length;
   if (smaller > 0) console.log(`views        ${smaller} of ${views.length} in fewer pixels, ${LARGEST_SIDE} a side`);
-  const dealt = dealViews(drawn);
-  if (dealt.heldOut.length > 0) return { ...dealt, scored: [...dealt.scored, ...viewsBetween(dealt.scored)] };
+  const dealt = dealOwnViews(drawn);
+  if (dealt.heldOut.length > 0) return { dealt, range: `of ${path} and between them` };
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
+}
+
+/** Sizes of views: the most frequent one. */
+function sizeOf(views) {
+  const counts = new Map();
+  for (const { width, height } of views) {
+    const size = `${width} x ${height}`;
+    counts.set(size, (counts.get(size) ?? 0) + 1);
+  }
+  return [...counts].sort((a, b) => b[1] - a[1])[0][0];
 }
 
 async function openDevice() {
@@ -187,7 +197,10 @@ async function main({
   encodingsFor(out, cloud);
   // What is left of it when the device is there.
   const read = seconds() - opened;
-  const views = ownViews ?? dealtViewsAround(boundsOf(cloud), { scored });
+  const { dealt: views, range } = ownViews ?? {
+    dealt: dealtViewsOfVisitors(boundsOf(cloud), scored),
+    range: '0.5 to 3.2 radii from the middle, up to 67° above and below',
+  };
   const say = (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`);
   const onScored = (done, all) => say(`scored in ${done} of ${all} views`);
   const measuring = await GpuEvaluator.create(device, cloud, views, { pool, onScored });
@@ -211,11 +224,13 @@ async function main({
   console.log(`
 asked        ${minDecibels.toFixed(2)} dB
 found        ${result.decibels.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
+views        ${range}; excerpts of ${sizeOf(views.heldOut)}, at the scale of 1920 x 1080 pixels
 splats       ${splats.after} of ${splats.before} (${share(splats)})${unusable}
 SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
 bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}
 seconds      ${times.join(', ')}`);
-  const figures = { ...result, bytes: newBytes, minDecibels, seconds: spent };
+  const judged = { views: range, excerpts: sizeOf(views.heldOut) };
+  const figures = { ...result, ...judged, bytes: newBytes, minDecibels, seconds: spent };
   if (report) writeWhole(report, JSON.stringify(figures, null, 2));
 }
 

@@ -10,7 +10,9 @@ export { RefiningEvaluator, type RefiningOptions } from './refine/refining-evalu
 export type { Descent } from './refine/scene-fitter.js';
 export type { LoweredColours, Ranking, Scores } from './score.js';
 export {
+  dealOwnViews,
   dealtViewsAround,
+  dealtViewsOfVisitors,
   dealViews,
   viewsAround,
   viewsBetween,

@@ -65,6 +65,58 @@ export function viewsFromEverywhere(bounds: Bounds, count: number, options: View
   });
 }
 
+/** Distances of views that visitors may take, in radii: from within the subject, where its splats are largest, to all of it in view. */
+const VISITED_DISTANCES = [0.5, 0.75, 1.1, 1.6, 2.3, 3.2];
+/** The element lets cameras go as far above a subject, and below it, radians. */
+const VISITED_ELEVATION = 1.17;
+
+/** Views that visitors may take of a subject: nearer than captures go, and from below, too; looking at points near its middle. */
+function viewsOfVisitors(bounds: Bounds, count: number, options: ViewOptions): Camera[] {
+  const { center, radius } = bounds;
+  return viewsAround(bounds, count, options).map((view, k) => {
+    const at = (step: number): number => ((k + 0.5 + 97 * (options.seed ?? 0)) * step) % 1;
+    const azimuth = 2 * Math.PI * at(0.6180339887);
+    const height = Math.sin(VISITED_ELEVATION) * (2 * at(0.7548776662) - 1);
+    const distance = radius * VISITED_DISTANCES[(k + (options.seed ?? 0)) % VISITED_DISTANCES.length];
+    const across = Math.sqrt(1 - height * height);
+    const direction = [across * Math.sin(azimuth), -height, -across * Math.cos(azimuth)];
+    const eye = center.map((value, axis) => value + distance * direction[axis]) as [number, number, number];
+    const aside = [0.5698402909, 0.3247179572, 0.4142135623].map((step) => 0.3 * radius * (at(step) - 0.5));
+    const target = center.map((value, axis) => value + aside[axis]) as [number, number, number];
+    return { ...view, worldToCamera: lookAt(eye, target, [0, -1, 0]) };
+  });
+}
+
+/** Pixels of the frames that people look at. */
+const FULL_PIXELS = 1920 * 1080;
+/** Pixels of the excerpts of these that errors are measured in: a whole one takes nine times as long and says the same of the scene. */
+const EXCERPT_PIXELS = 640 * 360;
+
+/** The size of frames in which errors of a view are measured: of as many pixels as people look at, where the view has fewer. */
+function fullSizeOf({ width, height }: Pick<Camera, 'width' | 'height'>): { width: number; height: number } {
+  const share = Math.max(1, Math.sqrt(FULL_PIXELS / (width * height)));
+  return { width: Math.round(share * width), height: Math.round(share * height) };
+}
+
+/** Excerpts of views in as many pixels as people look at: what a cut costs depends on the size of pixels, most where splats are smaller. */
+export function excerptsOf(views: readonly Camera[]): Camera[] {
+  return views.map((view, k) => {
+    const full = fullSizeOf(view);
+    const [x, y] = [full.width / view.width, full.height / view.height];
+    const share = Math.min(1, Math.sqrt(EXCERPT_PIXELS / (full.width * full.height)));
+    const [width, height] = [full.width, full.height].map((side) => Math.round(share * side));
+    const at = (step: number): number => ((k + 0.5) * step) % 1;
+    // Near the middle more often than at the edges, where subjects may not reach.
+    const [left, top] = [0.2 + 0.6 * at(0.5545497), 0.2 + 0.6 * at(0.3085152)];
+    return {
+      ...view,
+      ...{ width, height, fx: x * view.fx, fy: y * view.fy },
+      cx: x * view.cx - Math.round(left * (full.width - width)),
+      cy: y * view.cy - Math.round(top * (full.height - height)),
+    };
+  });
+}
+
 /** Views dealt out by what they are for. */
 export interface DealtViews {
   /** Splats are scored by what they contribute here. */
@@ -78,21 +130,23 @@ export interface DealtViews {
 /**
  * Views halfway between each camera and its nearest neighbour: what visitors see who move on from where images were taken. Scores of few cameras take
  * their very places for all there are. Between two that look in opposite directions, as of a panorama taken apart, there is none.
+ * @param all cameras that may be the neighbour; default the same
  */
-export function viewsBetween(views: readonly Camera[]): Camera[] {
-  const eyes = views.map(({ worldToCamera }) => eyeOf(worldToCamera));
-  const pairs = new Set<string>();
-  views.forEach((_, k) => {
+export function viewsBetween(views: readonly Camera[], all: readonly Camera[] = views): Camera[] {
+  const eyes = all.map(({ worldToCamera }) => eyeOf(worldToCamera));
+  const pairs = new Map<string, [Camera, Camera]>();
+  for (const view of views) {
+    const own = eyeOf(view.worldToCamera);
     const distances = eyes.map((eye, other) =>
-      other === k ? Infinity : Math.hypot(...eye.map((value, axis) => value - eyes[k][axis])),
+      all[other] === view ? Infinity : Math.hypot(...eye.map((value, axis) => value - own[axis])),
     );
     const nearest = distances.indexOf(Math.min(...distances));
-    if (Number.isFinite(distances[nearest])) pairs.add([k, nearest].sort((a, b) => a - b).join());
-  });
-  return [...pairs].flatMap((pair) => {
-    const [a, b] = pair.split(',').map(Number);
-    const worldToCamera = halfway(views[a], views[b]);
-    return worldToCamera ? [{ ...views[a], worldToCamera }] : [];
+    const key = [all.indexOf(view), nearest].sort((a, b) => a - b).join();
+    if (Number.isFinite(distances[nearest]) && !pairs.has(key)) pairs.set(key, [view, all[nearest]]);
+  }
+  return [...pairs.values()].flatMap(([a, b]) => {
+    const worldToCamera = halfway(a, b);
+    return worldToCamera ? [{ ...a, worldToCamera }] : [];
   });
 }
 
@@ -125,15 +179,50 @@ export interface DealtViewOptions extends Omit<ViewOptions, 'seed'> {
 /** Seeds of the three kinds: so far apart that no number of views to score in reaches those of the others. */
 const [SEARCHED_SEED, HELD_OUT_SEED, SCORED_SEED] = [1, 2, 10];
 
-/** Each distance six times: with six views in all the figure depended on which by a decibel or two (packages/economise/README.md). */
+/** Each distance four times: with six views in all the figure depended on which by a decibel or two (packages/economise/README.md). */
 const HELD_OUT = 24;
 
-/** Views around a subject, for scenes without cameras: 216 to score in, 8 to search in, 24 held out. */
+/** Views around a subject, of one size: 216 to score in, 8 to search in, 24 held out. */
 export function dealtViewsAround(bounds: Bounds, { scored = 216, ...options }: DealtViewOptions = {}): DealtViews {
-  const around = (count: number, seed: number): Camera[] => viewsAround(bounds, count, { ...options, seed });
+  return dealt(scored, (count, seed) => viewsAround(bounds, count, { ...options, seed }));
+}
+
+/**
+ * Views that visitors may take of a scene without cameras: 0.5 to 3.2 radii from its middle, up to 67° above it and below. Errors are measured in excerpts of frames of 1920 x 1080.
+ * @param scored views to score in
+ */
+export function dealtViewsOfVisitors(bounds: Bounds, scored = 216): DealtViews {
+  const { searched, heldOut, ...rest } = dealt(scored, (count, seed) => viewsOfVisitors(bounds, count, { seed }));
+  return { ...rest, searched: excerptsOf(searched), heldOut: excerptsOf(heldOut) };
+}
+
+const dealt = (scored: number, viewsOf: (count: number, seed: number) => Camera[]): DealtViews => ({
+  scored: viewsOf(scored, SCORED_SEED),
+  searched: viewsOf(8, SEARCHED_SEED),
+  heldOut: viewsOf(HELD_OUT, HELD_OUT_SEED),
+});
+
+/** Least pixels of views that splats are scored in: in smaller ones most of a scene is smaller than a pixel, and seems unneeded. */
+const LEAST_SCORED_PIXELS = 480 * 270;
+
+/**
+ * Deals a scene's own views out ({@link dealViews}). Splats are scored between neighbours, too, and errors are measured there as well as in the views themselves, in excerpts of
+ * frames of as many pixels as visitors look at.
+ */
+export function dealOwnViews(views: readonly Camera[]): DealtViews {
+  const { scored, searched, heldOut } = dealViews(views);
+  const judged = (own: readonly Camera[]): Camera[] => excerptsOf([...own, ...viewsBetween(own, views)]);
   return {
-    scored: around(scored, SCORED_SEED),
-    searched: around(8, SEARCHED_SEED),
-    heldOut: around(HELD_OUT, HELD_OUT_SEED),
+    scored: [...scored, ...viewsBetween(scored)].map((view) => atLeast(view, LEAST_SCORED_PIXELS)),
+    searched: judged(searched),
+    heldOut: judged(heldOut),
   };
+}
+
+function atLeast(view: Camera, pixels: number): Camera {
+  const share = Math.sqrt(pixels / (view.width * view.height));
+  if (share <= 1) return view;
+  const [width, height] = [view.width, view.height].map((side) => Math.round(share * side));
+  const [x, y] = [width / view.width, height / view.height];
+  return { ...view, width, height, fx: x * view.fx, fy: y * view.fy, cx: x * view.cx, cy: y * view.cy };
 }
