@@ -37,11 +37,12 @@ const prose = new Map(documents.map((path) => [path, blocksOfMarkdown(read(path)
 const texts = [
   ...[...prose].flatMap(([path, blocks]) => placed(path, blocks)),
   ...filesIn('demo', '.md').flatMap((path) => placed(path, blocksOfMarkdown(read(path)))),
-  ...[...filesIn('demo', '.njk'), ...filesIn('demo', '.html')].flatMap((path) =>
+  ...[...filesIn('demo', '.njk'), ...filesIn('demo', '.html'), ...filesIn('benchmarks', '.html')].flatMap((path) =>
     placed(path, blocksOfPage(read(path))),
   ),
   ...[
     ...filesIn('demo', '.js'),
+    ...filesIn('benchmarks', '.js'),
     ...filesIn('demo', '.tsx'),
     ...filesIn('packages', '.ts').filter((path) => path.includes('/src/')),
   ].flatMap((path) => sentencesInCode(join(root, path))),

@@ -1,8 +1,8 @@
 /**
- * The site as Eleventy builds it: pages are the HTML files of demo/, each in the room of its scripts; the documents of the
+ * The site as Eleventy builds it: pages are the HTML files of demo/, each beside its scripts, and those of benchmarks/; the documents of the
  * repository are rendered beside them from where they lie. `npm run build` runs it after the packages.
  */
-import { readFileSync, statSync } from 'node:fs';
+import { readdirSync, readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from '../../scripts/lib/run.mjs';
 import { documents } from './documents.mjs';
@@ -17,15 +17,15 @@ const COPIED = {
   'demo/home.css': 'home.css',
   'demo/icon.svg': 'icon.svg',
   'demo/scenes': 'scenes',
-  'demo/bench/page/bench.css': 'bench/page/bench.css',
-  'demo/bench/peers/*.html': 'bench/peers',
+  'benchmarks/page/bench.css': 'bench/page/bench.css',
+  'benchmarks/peers/*.html': 'bench/peers',
   'docs/*.png': 'docs',
   'docs/stability': 'stability/data',
   'docs/frontier': 'frontier/data',
   'packages/element/cdn': 'cdn',
 };
-/** HTML that is no page of the site: what is built, and what the benchmark frames. */
-const NOT_PAGES = ['demo/dist/**', 'demo/bench/peers/**', 'demo/site/layouts/**'];
+/** HTML that is no page of the site. */
+const NOT_PAGES = ['demo/dist/**', 'demo/site/layouts/**'];
 
 export default function configure(eleventy) {
   eleventy.setUseGitIgnore(false);
@@ -47,6 +47,9 @@ export default function configure(eleventy) {
       document,
     });
   }
+  // The pages that measure lie with their scripts, outside the demo.
+  for (const name of readdirSync(join(root, 'benchmarks')).filter((file) => file.endsWith('.html')))
+    eleventy.addTemplate(`bench/${name}`, readFileSync(join(root, 'benchmarks', name), 'utf8'));
   eleventy.amendLibrary('md', improveMarkdown);
   eleventy.addFilter('megabytes', (path) => `${(statSync(join(root, path)).size / 1e6).toFixed(2)} MB`);
   eleventy.addFilter('source', (path) => readFileSync(join(root, path), 'utf8'));

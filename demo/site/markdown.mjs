@@ -13,6 +13,8 @@ const ADDRESSES = [
   [/^docs\/stability\/(.+)$/, '/stability/data/$1'],
   [/^docs\/([^/]+\.png)$/, '/docs/$1'],
   [/^demo\/(scenes\/.+|generators\/.+\.(?:onnx|json|webp|png))$/, '/$1'],
+  [/^benchmarks\/?$/, '/bench/'],
+  [/^benchmarks\/([\w-]+\.html)$/, '/bench/$1'],
   [new RegExp(`^demo/(${pageFolders.join('|')})/?$`), '/$1/'],
 ];
 const urlOfSource = new Map(documents.map(({ source, url }) => [source, url]));

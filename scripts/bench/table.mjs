@@ -1,5 +1,5 @@
 /** A benchmark's report as text. */
-import { adapterName } from '../../demo/bench/run/environment.js';
+import { adapterName } from '../../benchmarks/run/environment.js';
 
 const ms = (summary) => (summary ? summary.p50.toFixed(summary.p50 < 10 ? 2 : 1) : '');
 

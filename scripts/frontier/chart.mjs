@@ -1,6 +1,6 @@
 /** The chart of speed against accuracy as SVG: milliseconds on a logarithmic axis, dB upwards, the front as a line. */
 import { scaleLinear, scaleLog } from 'd3-scale';
-import { adapterName } from '../../demo/bench/run/environment.js';
+import { adapterName } from '../../benchmarks/run/environment.js';
 import { nonDominated, pointsOf } from './front.mjs';
 import { placeLabels } from './labels.mjs';
 import { escape, styleOf, tag, words } from '../charts/svg.mjs';

@@ -2,7 +2,7 @@
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
-import { adapterName } from '../../demo/bench/run/environment.js';
+import { adapterName } from '../../benchmarks/run/environment.js';
 import { runPage } from '../lib/browser-page.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';

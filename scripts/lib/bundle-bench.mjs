@@ -22,7 +22,7 @@ const ENTRIES = [
 
 /** @param folder where the pages are, for example demo/dist/bench. */
 export async function bundleBench(folder) {
-  const from = join(root, 'demo/bench');
+  const from = join(root, 'benchmarks');
   await build({
     entryPoints: ENTRIES.map((name) => join(from, `${name}.js`)),
     outdir: folder,

@@ -32,7 +32,7 @@ function packagesOf(file) {
   if (top === 'shaders') return ['renderer', 'economise'];
   if (top === 'tests' && second !== 'support' && second !== 'fixtures')
     return all.filter((name) => TESTS_OF[name].includes(second));
-  if (top === 'demo' || top === 'docs' || file.endsWith('.md')) return ['site'];
+  if (top === 'demo' || top === 'benchmarks' || top === 'docs' || file.endsWith('.md')) return ['site'];
   if (top === 'scripts' || top === 'exporter') return [];
   return all;
 }

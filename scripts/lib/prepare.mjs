@@ -20,7 +20,7 @@ export function ensureDependencies() {
 const WHOLE = {
   stamp: '.cache/built',
   sources: [
-    ...['shaders', 'packages', 'demo', 'docs', 'scripts', 'package.json'],
+    ...['shaders', 'packages', 'demo', 'benchmarks', 'docs', 'scripts', 'package.json'],
     // Documents that the site shows.
     ...['README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'SECURITY.md', 'LICENSE'],
   ],

@@ -1,4 +1,4 @@
-/** The flight of demo/bench/detail.js without a GPU and without a clock: the same path, the real rules of who comes and goes, a server of known speed. */
+/** The flight of benchmarks/detail.js without a GPU and without a clock: the same path, the real rules of who comes and goes, a server of known speed. */
 import type { Bounds, Camera } from '@gaussian-splat/core';
 import { SharedReads } from '@gaussian-splat/core/fetch';
 import {

@@ -21,10 +21,6 @@ export const meanSquareOf = (decibels: number): number => 10 ** (-decibels / 10)
 export const mean = (values: readonly number[]): number =>
   values.reduce((sum, value) => sum + value, 0) / values.length;
 
-/** dB of some views together, by the errors of those that show anything; Infinity where none does. */
-export const decibelsTogether = (errors: readonly number[]): number =>
-  errors.length === 0 ? Infinity : decibels(mean(errors));
-
 /**
  * The error of some views together.
  * @param errors of those that show anything

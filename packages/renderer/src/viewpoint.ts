@@ -1,10 +1,9 @@
 import { loadModule, validateCamera, type Camera } from '@gaussian-splat/core';
-import { AccumulationTexture } from './accumulation.js';
-import { makeStages, type Stages } from './bindings.js';
 import type { ProbeAnswer, ProbePoint, ProbeSource } from './depth-probe.js';
 import type { Scratch } from './scratch.js';
 import { recordProjection } from './frame.js';
-import { FrameResources, type Resources } from './frame-resources.js';
+import { Engine, type Accumulation } from './engine.js';
+import type { Resources } from './frame-resources.js';
 import type { PageRequests } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
@@ -15,17 +14,8 @@ import type { RenderSettings } from './render-settings.js';
 import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
 import { OverdrawLimit } from './overdraw.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
-import { QuadsRasterizer } from './rasterizers/quads.js';
-import type {
-  AuxiliaryFrame,
-  AuxiliaryTilePainter,
-  Painting,
-  Rasterizer,
-  RasterizerName,
-} from './rasterizers/rasterizer.js';
-import { TilesRasterizer } from './rasterizers/tiles.js';
-import { requireBlendable, requireTextureSize } from './requirements.js';
-import { ComposeStage, type ComposeBindings } from './stages/compose.js';
+import type { AuxiliaryFrame, AuxiliaryTilePainter, Painting, RasterizerName } from './rasterizers/rasterizer.js';
+import { ComposeStage } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import type { FrameCounts } from './capacity.js';
 import { checkArguments, checkFrame, settingsOf } from './checks.js';
@@ -39,12 +29,6 @@ import type { World } from './world.js';
 export interface View {
   readonly camera: Camera;
   readonly picture: FrameTarget;
-}
-
-/** What an image size needs where the rasterizer cannot write the target. */
-interface Accumulation {
-  readonly texture: AccumulationTexture;
-  readonly compose: ComposeBindings;
 }
 
 /** In how many parts the painting of a frame is handed over, and who times them. */
@@ -84,14 +68,6 @@ interface Encoded {
   readonly resources: Resources;
 }
 
-/** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
-interface Engine {
-  readonly levers: RenderSettings & Variants;
-  readonly stages: Stages;
-  readonly rasterizer: Rasterizer;
-  readonly resources: FrameResources;
-}
-
 /**
  * Draws a world, on your own device.
  *
@@ -122,8 +98,6 @@ export class Viewpoint {
   readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
   #settings: FrameSettings;
   #engine: Engine;
-  /** By size, the one used last at the end. */
-  readonly #accumulations = new Map<string, Accumulation>();
   #mostSizes = 1;
   /** Of the last frame with auxiliary outputs. */
   #auxiliary: AuxiliaryTilePainter | undefined;
@@ -183,9 +157,7 @@ export class Viewpoint {
 
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
-    const textures = [...this.#accumulations.values()].map(({ texture }) => texture);
-    const parts = [this.#memory, this.#engine.resources, this.#engine.rasterizer, ...textures];
-    return parts.reduce((sum, { byteLength }) => sum + byteLength, 0);
+    return this.#memory.byteLength + this.#engine.byteLength;
   }
 
   /** What the last frame with auxiliary outputs was painted from; undefined before there is one. */
@@ -264,8 +236,7 @@ export class Viewpoint {
   ): Encoded {
     const { auxiliary, timer, depth } = picture;
     validateCamera(camera);
-    requireTextureSize(this.#device, camera);
-    checkArguments(picture, settings);
+    checkArguments(this.#device, camera, picture, settings);
     const asked = this.#resolve(settings);
     checkFrame(camera, picture, asked);
     const target = this.#targetOf(picture, camera);
@@ -399,7 +370,8 @@ export class Viewpoint {
 
   /** Frees all GPU memory. Scenes are not touched: they belong to the caller that uploaded them. */
   destroy(): void {
-    this.#destroyEngine();
+    this.#engine.destroy();
+    this.#last = undefined;
     this.#memory.destroy();
   }
 
@@ -489,35 +461,16 @@ export class Viewpoint {
 
   /** What frames of these settings are drawn with: made anew where they ask for another rasterizer. */
   #useEngine(levers: RenderSettings & Variants): Engine {
-    const { levers: own } = this.#engine;
-    const isOwn =
-      own.rasterizer === levers.rasterizer &&
-      own.accumulation === levers.accumulation &&
-      own.threads === levers.threads;
-    if (isOwn) return this.#engine;
+    if (this.#engine.serves(levers)) return this.#engine;
     const engine = this.#makeEngine(levers);
-    this.#destroyEngine();
-    this.#engine = engine;
-    return engine;
+    this.#engine.destroy();
+    this.#last = undefined;
+    return (this.#engine = engine);
   }
 
   #makeEngine(levers: RenderSettings & Variants): Engine {
-    const stages = makeStages(this.#device, levers);
-    const rasterizer = makeRasterizer(this.#device, levers);
-    const resources = new FrameResources(this.#device, {
-      ...{ stages, rasterizer },
-      pairsAtOnce: () => this.#pacer.pairsAtOnce,
-      onIncomplete: this.#onIncomplete,
-    });
-    return { levers, stages, rasterizer, resources };
-  }
-
-  #destroyEngine(): void {
-    this.#engine.resources.release();
-    this.#engine.rasterizer.destroy();
-    for (const { texture } of this.#accumulations.values()) texture.destroy();
-    this.#accumulations.clear();
-    this.#last = undefined;
+    const pairsAtOnce = (): number => this.#pacer.pairsAtOnce;
+    return new Engine(this.#device, levers, { pairsAtOnce, onIncomplete: this.#onIncomplete });
   }
 
   #targetOf({ target }: FrameTarget, camera: Camera): Target {
@@ -536,31 +489,10 @@ export class Viewpoint {
     const share = this.resolvedSettings.resolutionScale;
     const width = Math.max(drawn.width, Math.round(target.width * share));
     const height = Math.max(drawn.height, Math.round(target.height * share));
-    const key = `${width} ${height}`;
-    const known = this.#accumulations.get(key);
-    if (known) {
-      this.#accumulations.delete(key);
-      this.#accumulations.set(key, known);
-      return known;
-    }
-    for (const old of this.#accumulations.keys()) {
-      if (this.#accumulations.size < this.#mostSizes) break;
-      this.#accumulations.get(old)!.texture.destroy();
-      this.#accumulations.delete(old);
-    }
-    const texture = new AccumulationTexture(this.#device, this.#engine.levers.accumulation, width, height);
-    const compose = this.#compose.bind({ compose: this.#composeUniform, accumulated: texture.view });
-    const made = { texture, compose };
-    this.#accumulations.set(key, made);
-    return made;
+    return this.#engine.accumulationOf({ width, height }, this.#mostSizes, (accumulated) =>
+      this.#compose.bind({ compose: this.#composeUniform, accumulated }),
+    );
   }
-}
-
-/** @throws GaussianSplatError `unsupported/limits` if the variant needs a feature that the device lacks. */
-function makeRasterizer(device: GPUDevice, { rasterizer, accumulation, threads }: Variants): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, accumulation, threads);
-  requireBlendable(device, accumulation);
-  return new QuadsRasterizer(device, accumulation);
 }
 
 /** Whether a frame is drawn as one at rest is: with fewer pixels, or painted less far, it says less of what a frame needs. */

@@ -220,8 +220,6 @@ export type InputBinding =
   | GaussiansInput
   | ImageInput;
 
-export type InputRole = InputBinding['role'];
-
 /** What one Gaussian is made of. */
 export type GaussianAttribute = 'positions' | 'covariances' | 'scales' | 'rotations' | 'colors' | 'sh' | 'opacities';
 

@@ -1,11 +1,5 @@
 import { ONNX_DTYPES, type OnnxDtype, type OnnxHeader, type OnnxNode, type OnnxValue } from './header.js';
 
-/** A type and a shape, as far as the file lets one know them. */
-export interface KnownValue {
-  readonly dtype: OnnxDtype | undefined;
-  readonly dims: readonly (number | null)[] | undefined;
-}
-
 const BOOLEANS = new Set('Equal Less LessOrEqual Greater GreaterOrEqual Not And Or Xor IsNaN IsInf'.split(' '));
 const INT64 = new Set('Shape Size ArgMax ArgMin NonZero'.split(' '));
 /** What comes out has the shape of what goes in first. */

@@ -11,12 +11,11 @@ import {
   type MovingName,
 } from '@gaussian-splat/formats';
 import { concatenated } from '../concatenated.js';
-import { GpuEvaluator } from '../gpu/gpu-evaluator.js';
+import type { GpuEvaluator } from '../gpu/gpu-evaluator.js';
 import { decibels, mean, meanSquareOf } from '../measure.js';
-import { typicalSize, type CodeSequenceOptions } from '../motion/code-sequence.js';
+import { judgeOf, typicalSize, type CodeSequenceOptions } from '../motion/code-sequence.js';
 import type { MotionSteps } from '../motion/write-motion.js';
 import { findSteps, scaledSteps, type Steps } from '../steps.js';
-import { viewsAround } from '../views.js';
 import type { Encoding } from '../write/index.js';
 import { tuneSog } from '../write/tune-sog.js';
 import { TrackedPart, type WrittenClipPart } from './clip-part.js';
@@ -262,12 +261,6 @@ async function judgesOf(device: GPUDevice, frames: readonly GaussianCloud[]): Pr
   const judges: FrameJudge[] = [];
   for (const frame of numbers) judges.push({ frame, judge: await judgeOf(device, frames[frame], VIEWS, 7 + frame) });
   return judges;
-}
-
-/** Compares other clouds with a frame, in `count` views. */
-function judgeOf(device: GPUDevice, cloud: GaussianCloud, count: number, seed: number): Promise<GpuEvaluator> {
-  const views = viewsAround(boundsOf(cloud), count, { seed });
-  return GpuEvaluator.create(device, cloud, { scored: views.slice(0, 1), searched: views, heldOut: views });
 }
 
 const frameOf = (parts: readonly ClipPartContent[], frame: number): GaussianCloud =>

@@ -95,7 +95,7 @@ export async function codeSequence(options: CodeSequenceOptions): Promise<CodedS
 }
 
 /** Compares other clouds with a frame, in `count` views. */
-function judgeOf(device: GPUDevice, cloud: GaussianCloud, count: number, seed: number): Promise<GpuEvaluator> {
+export function judgeOf(device: GPUDevice, cloud: GaussianCloud, count: number, seed: number): Promise<GpuEvaluator> {
   const views = viewsAround(boundsOf(cloud), count, { seed });
   return GpuEvaluator.create(device, cloud, { scored: views.slice(0, 1), searched: views, heldOut: views });
 }

@@ -1,6 +1,6 @@
 /** How far an image is from the reference, over black and as far as a display can show it. */
 import { ssim } from 'ssim.js';
-import { maxAbs, percentile, psnr } from '../../../tests/support/metrics.ts';
+import { maxAbs, percentile, psnr } from '../../tests/support/metrics.ts';
 
 const clamped = (value) => Math.min(1, Math.max(0, value));
 const round = (value, digits) => Number(value.toFixed(digits));

@@ -1,6 +1,6 @@
 /** The page of pictures in motion: elements in a page, steps of the load, and whether they keep in time. See docs/benchmark.md. */
 import { fetchScene, readScene } from '@gaussian-splat/formats';
-import { LADDER } from '../../packages/element/dist/pace/ladder.js';
+import { LADDER } from '../packages/element/dist/pace/ladder.js';
 import { showError, showProgress } from './page/show.js';
 import { Burner } from './pace/burner.js';
 import { figuresOf, pixelsFor, summarize } from './pace/figures.js';

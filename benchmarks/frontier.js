@@ -2,7 +2,7 @@
  * The frontier page: accuracy and time of every configuration of scripts/frontier/configurations.mjs on one scene, path and
  * size. All comparing is done here, so that only numbers leave the machine that it runs on.
  */
-import { configurations as table } from '../../scripts/frontier/configurations.mjs';
+import { configurations as table } from '../scripts/frontier/configurations.mjs';
 import { camerasAlong } from './scene/paths.js';
 import { showError, showProgress, showResults } from './page/show.js';
 import { DEFAULTS, readConfigurations, readRun } from './run/configuration.js';

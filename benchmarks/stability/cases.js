@@ -2,13 +2,13 @@
  * Rows of the stability catalogue that any viewer of a page can be put through: a scene, views, and what is asked of the pictures. The names are those of
  * tests/stability. Views are centred pinholes, since peers take no others.
  */
-import { cloudOf, repeat } from '../../../tests/support/clouds.ts';
-import { seededRandom } from '../../../tests/support/random.ts';
-import { withHostileSplats } from '../../../tests/support/hostile.ts';
-import { cameraAt, movedBy } from '../../../tests/support/scenes.ts';
-import { brightColors, opacityLadder } from '../../../tests/support/scenes/values.ts';
-import { needles } from '../../../tests/support/scenes/shapes.ts';
-import { room } from '../../../tests/support/scenes/room.ts';
+import { cloudOf, repeat } from '../../tests/support/clouds.ts';
+import { seededRandom } from '../../tests/support/random.ts';
+import { withHostileSplats } from '../../tests/support/hostile.ts';
+import { cameraAt, movedBy } from '../../tests/support/scenes.ts';
+import { brightColors, opacityLadder } from '../../tests/support/scenes/values.ts';
+import { needles } from '../../tests/support/scenes/shapes.ts';
+import { room } from '../../tests/support/scenes/room.ts';
 
 const SIZE = { width: 160, height: 120 };
 const view = (eye, target, fovXDegrees = 60) => cameraAt(eye, target, { ...SIZE, fovXDegrees });

@@ -3,7 +3,7 @@
  * the figures are POSTed as JSON.
  */
 import { autotune, deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
-import { renderOracle } from '../../tests/oracle/oracle.ts';
+import { renderOracle } from '../tests/oracle/oracle.ts';
 import { OwnRenderer } from './run/own-renderer.js';
 import { openPeer } from './run/peer.js';
 import { sendReport } from './run/report.js';

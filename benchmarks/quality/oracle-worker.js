@@ -1,5 +1,5 @@
 /** The float64 oracle of the tests, off the main thread. */
-import { renderOracle } from '../../../tests/oracle/oracle.ts';
+import { renderOracle } from '../../tests/oracle/oracle.ts';
 
 onmessage = ({ data: { cloud, cameras } }) => {
   for (const { index, camera } of cameras) {

@@ -1,0 +1,91 @@
+import type { Camera } from '@gaussian-splat/core';
+import { AccumulationTexture } from './accumulation.js';
+import { makeStages, type Stages } from './bindings.js';
+import { FrameResources } from './frame-resources.js';
+import { QuadsRasterizer } from './rasterizers/quads.js';
+import type { Rasterizer } from './rasterizers/rasterizer.js';
+import { TilesRasterizer } from './rasterizers/tiles.js';
+import type { RenderSettings } from './render-settings.js';
+import { requireBlendable } from './requirements.js';
+import type { ComposeBindings } from './stages/compose.js';
+import type { Variants } from './variants.js';
+
+/** What an image size needs where the rasterizer cannot write the target. */
+export interface Accumulation {
+  readonly texture: AccumulationTexture;
+  readonly compose: ComposeBindings;
+}
+
+/** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
+export class Engine {
+  readonly levers: RenderSettings & Variants;
+  readonly stages: Stages;
+  readonly rasterizer: Rasterizer;
+  readonly resources: FrameResources;
+  readonly #device: GPUDevice;
+  /** By size, the one used last at the end. */
+  readonly #accumulations = new Map<string, Accumulation>();
+
+  /** @throws GaussianSplatError `unsupported/limits` if the variant needs a feature that the device lacks. */
+  constructor(
+    device: GPUDevice,
+    levers: RenderSettings & Variants,
+    needs: { readonly pairsAtOnce: () => number; readonly onIncomplete: () => void },
+  ) {
+    this.#device = device;
+    this.levers = levers;
+    this.stages = makeStages(device, levers);
+    this.rasterizer = makeRasterizer(device, levers);
+    this.resources = new FrameResources(device, { stages: this.stages, rasterizer: this.rasterizer, ...needs });
+  }
+
+  /** Whether frames of these settings can be drawn with it. */
+  serves({ rasterizer, accumulation, threads }: Variants): boolean {
+    const { levers } = this;
+    return rasterizer === levers.rasterizer && accumulation === levers.accumulation && threads === levers.threads;
+  }
+
+  get byteLength(): number {
+    const textures = [...this.#accumulations.values()].map(({ texture }) => texture);
+    return [this.resources, this.rasterizer, ...textures].reduce((sum, { byteLength }) => sum + byteLength, 0);
+  }
+
+  /**
+   * What splats are accumulated in.
+   * @param most sizes that are kept
+   * @param bind binds the texture of a new size
+   */
+  accumulationOf(
+    { width, height }: Pick<Camera, 'width' | 'height'>,
+    most: number,
+    bind: (accumulated: GPUTextureView) => ComposeBindings,
+  ): Accumulation {
+    const all = this.#accumulations;
+    const key = `${width} ${height}`;
+    let found = all.get(key);
+    all.delete(key);
+    if (!found) {
+      for (const [old, { texture }] of all) {
+        if (all.size < most) break;
+        texture.destroy();
+        all.delete(old);
+      }
+      const texture = new AccumulationTexture(this.#device, this.levers.accumulation, width, height);
+      found = { texture, compose: bind(texture.view) };
+    }
+    all.set(key, found);
+    return found;
+  }
+
+  destroy(): void {
+    this.resources.release();
+    this.rasterizer.destroy();
+    for (const { texture } of this.#accumulations.values()) texture.destroy();
+  }
+}
+
+function makeRasterizer(device: GPUDevice, { rasterizer, accumulation, threads }: Variants): Rasterizer {
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, accumulation, threads);
+  requireBlendable(device, accumulation);
+  return new QuadsRasterizer(device, accumulation);
+}
