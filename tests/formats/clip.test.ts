@@ -1,6 +1,10 @@
-/** Clips: what is read is what was written, splats come and go, and what an index says is checked before anything is made of it. */
+/**
+ * Clips: what is read is what was written, splats come and go, and what an index says is checked before anything is made of it.
+ * SECURITY.md: "A scene costs what it weighs".
+ */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { constants, deflateRawSync, inflateRawSync } from 'node:zlib';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import {
   CLIP_HEAD_BYTES,
@@ -9,6 +13,7 @@ import {
   LoadBudget,
   parseClip,
   readClipPart,
+  readScene,
   type ClipIndex,
   type ClipPartContent,
 } from '@gaussian-splat/formats';
@@ -142,4 +147,86 @@ test('parts that are others than the index says are refused', async () => {
   const [part] = index.groups[0].parts;
   damaged.fill(0xff, part.start + part.sceneBytes + 2, part.start + part.sceneBytes + 40);
   assert.match(await read(index, damaged), /^decode\//);
+});
+
+test('parts that say more than they hold, or hold more than they say, are refused by name', async () => {
+  const group = index.groups[0];
+  const [part] = group.parts;
+  const scene = clip.bytes.subarray(part.start, part.start + part.sceneBytes);
+  const motion = new Uint8Array(
+    inflateRawSync(clip.bytes.subarray(part.start + part.sceneBytes, part.start + part.sceneBytes + part.motionBytes), {
+      finishFlush: constants.Z_SYNC_FLUSH,
+    }),
+  );
+  const view = new DataView(motion.buffer);
+  const ranks = [0, 1, 2, 3, 4].map((k) => view.getUint32(12 + 8 * k, true));
+  const numbers = [3, 3, 3, 1, 3];
+  // Behind the head, the curves and the modes of the planes.
+  const lives = 52 + ranks.reduce((sum, rank, k) => sum + rank * (4 * group.frames + numbers[k]), 0);
+  const edited = (change: (bytes: Uint8Array, own: DataView) => void): Uint8Array => {
+    const copy = motion.slice();
+    change(copy, new DataView(copy.buffer));
+    return copy;
+  };
+  const cases: readonly (readonly [string, Uint8Array, object, RegExp])[] = [
+    ['as it is', motion, {}, /^nothing$/],
+    [
+      'a life without an end',
+      edited((bytes) => bytes.fill(255, lives + 2 * part.splats, lives + 4 * part.splats)),
+      {},
+      /^decode\/corrupt.*live/,
+    ],
+    [
+      'an end before the birth',
+      edited((bytes) => bytes.fill(0, lives + 2 * part.splats, lives + 4 * part.splats)),
+      {},
+      /^decode\/corrupt.*live/,
+    ],
+    ['endless curves', edited((_, own) => own.setUint32(12, 2 ** 31, true)), {}, /^decode\/header.*curves/],
+    ['other frames', edited((_, own) => own.setUint32(8, 2 ** 31, true)), {}, /^decode\/header.*frames/],
+    ['other splats', edited((_, own) => own.setUint32(4, 2 ** 31, true)), {}, /^decode\/header/],
+    ['a flood behind it', concat(motion, new Uint8Array(2e8)), {}, /^decode\/truncated.*more/],
+    ['a curve of no number', edited((_, own) => own.setFloat32(52, NaN, true)), {}, /^decode\/corrupt.*curves/],
+    ['more splats than the page allows', motion, { limits: { maxSplats: part.splats - 1 } }, /^out-of-memory\/budget/],
+    ['more bytes than the page allows', motion, { limits: { maxBytes: 1000 } }, /^out-of-memory\/budget/],
+    ['splats that the scene lacks', motion, { splats: part.splats + 1 }, /^decode\/header/],
+  ];
+  for (const [name, raw, { limits, ...changes }, expected] of cases as readonly [
+    string,
+    Uint8Array,
+    { limits?: object },
+    RegExp,
+  ][]) {
+    const packed = new Uint8Array(deflateRawSync(raw));
+    const own = { ...part, motionBytes: packed.length, ...changes };
+    let said = 'nothing';
+    try {
+      await readClipPart({ bytes: concat(scene, packed), part: own, frames: group.frames, name: 'a.gsv', limits });
+    } catch (error) {
+      said = `${(error as { code: string }).code} ${(error as Error).message}`;
+    }
+    assert.match(said, expected, name);
+  }
+});
+
+function concat(a: Uint8Array, b: Uint8Array): Uint8Array {
+  const both = new Uint8Array(a.length + b.length);
+  both.set(a);
+  both.set(b, a.length);
+  return both;
+}
+
+test('a clip that is read as a scene, and a .4dgs container, are refused with what to do', async () => {
+  const container = new TextEncoder().encode('    4DGS1\r\n').subarray(3);
+  container[0] = 0x89;
+  const files = [
+    [clip.bytes, /a clip of many frames.*\.gsv/s],
+    [new Uint8Array([...container, ...new Uint8Array(64)]), /\.4dgs container.*gaussian-splat sequence/s],
+  ] as const;
+  for (const [bytes, expected] of files)
+    await assert.rejects(readScene(bytes, { name: 'a file' }), (error: { code: string; message: string }) => {
+      assert.equal(error.code, 'decode/unsupported');
+      assert.match(error.message, expected);
+      return true;
+    });
 });

@@ -53,6 +53,16 @@ const SIGNED_KINDS: Readonly<Record<ForeignName, ForeignKind>> = {
   webp: foreign('a WebP image'),
   gif: foreign('a GIF image'),
   pdf: foreign('a PDF document'),
+  clip: {
+    code: 'decode/unsupported',
+    found: 'a clip of many frames',
+    remedy: 'show it as the src of <gaussian-splat>, by an address whose path ends with .gsv',
+  },
+  fourDgs: {
+    code: 'decode/unsupported',
+    found: 'a .4dgs container, which is not read',
+    remedy: 'export its frames as scene files, and make a clip of these with gaussian-splat sequence',
+  },
   zstandard: foreign('a Zstandard file'),
 };
 

@@ -18,6 +18,8 @@ const SIGNATURES = {
   webp: (bytes) => startsWith(bytes, 'RIFF') && startsWith(bytes, 'WEBP', 8),
   gif: (bytes) => startsWith(bytes, 'GIF8'),
   pdf: (bytes) => startsWith(bytes, '%PDF-'),
+  clip: (bytes) => startsWith(bytes, 'GSV\n'),
+  fourDgs: (bytes) => startsWith(bytes, '\x894DGS'),
   zstandard: (bytes) => startsWith(bytes, [0x28, 0xb5, 0x2f, 0xfd]),
 } as const satisfies Readonly<Record<string, Fits>>;
 

@@ -315,7 +315,7 @@ export class Viewpoint {
 
   /** What orders the splats of a frame pixel by pixel; undefined where nothing does, or not yet: then {@link ViewpointOptions.onIncomplete} says when. */
   #orderOf({ order }: RenderSettings): PixelOrder | undefined {
-    if (order === 'center') return undefined;
+    if (order !== 'pixel') return undefined;
     const lazy = orderOn(this.#device);
     // A caller that asks whether the frame is complete gets the error.
     if (!lazy.now) lazy.load().then(this.#onIncomplete, () => undefined);

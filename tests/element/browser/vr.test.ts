@@ -7,6 +7,7 @@ import { orderView, SplatOrder } from '@gaussian-splat/renderer/webgl';
 import { renderOracle, toRgba } from '../../oracle/oracle.js';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { psnr } from '../../support/metrics.js';
+import { violationsIn } from './support/axe.js';
 import { EYE, headset } from './support/headset.js';
 import {
   assert,
@@ -169,6 +170,18 @@ describe('VR', () => {
       return order.subarray(0, sorter.sort(view, order));
     });
     assertEqual(orders[0].length > 1000 && orders[0].every((splat, i) => splat === orders[1][i]), true, 'same');
+  });
+
+  it('its buttons, those of AR and of the ruler, and walking have no fault that axe finds', async () => {
+    const element = await showVr({ ar: '', measure: '', navigation: 'walk', unit: '1m' });
+    const part = (name: string): HTMLElement | null => element.shadowRoot!.querySelector(`[part=${name}]`);
+    await until(() => part('measure-button') !== null, 'the ruler', LIMIT_MS);
+    assertEqual(await violationsIn(element), [], 'axe');
+    part('measure-button')!.click();
+    await frames(2);
+    assertEqual(part('measure-button')!.getAttribute('aria-pressed'), 'true', 'pressed');
+    assertEqual(await violationsIn(element), [], 'axe while measuring');
+    await claimComing(/floor/);
   });
 
   const count = 100;

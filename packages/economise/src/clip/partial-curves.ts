@@ -7,6 +7,8 @@ export type Span = (row: number) => readonly [first: number, end: number];
 const ROUNDS = 2;
 /** Curves at most that missing frames are found by. */
 const MOST_CURVES = 10;
+/** Curves at most that a row with missing frames follows. A fit takes the third power of their number. */
+const MOST_FITTED = 20;
 /** Share of the frames that are enough to tell a parabola. */
 const LONG = 0.3;
 /** Share of what rows do as a rule that is taken for noise at least: short lives are told from by no more. */
@@ -46,10 +48,11 @@ export function followedWithin(changes: Float32Array, frames: number, span: Span
   const found = followed(changes, frames, least);
   const { curves, shares } = found;
   if (partial.length > 0 && curves.length > 0) {
-    const fit = new RowFit(curves, powersOf(changes, frames, curves), least);
+    const main = curves.slice(0, MOST_FITTED);
+    const fit = new RowFit(main, powersOf(changes, frames, main), least);
     for (const row of partial) {
       const own = fit.of(changes.subarray(frames * row, frames * (row + 1)), ...span(row));
-      shares.forEach((share, k) => (share[row] = own[k]));
+      shares.forEach((share, k) => (share[row] = own[k] ?? 0));
     }
   }
   return found;

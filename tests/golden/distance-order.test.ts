@@ -1,0 +1,55 @@
+/** `order: 'distance'`: what is nearer to the eye is in front, whatever its depth along the camera's axis, and turning the camera changes nothing of that. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import type { Vector3 } from '@gaussian-splat/core';
+import { cloudOf, type SplatDescription } from '../support/clouds.js';
+import { renderCloud } from '../support/compare.js';
+import { psnr } from '../support/metrics.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { cameraAt } from '../support/scenes.js';
+
+const LEAST_DB = 59;
+after(endNodeDevice);
+
+/** Nearer along the axis of a camera at the origin that looks to +z, but farther away than the other one. */
+const aside: SplatDescription = { position: [1.5, 0, 3], scale: 0.9, opacity: 0.9, color: [0.9, 0.1, 0.1] };
+const ahead: SplatDescription = { position: [0, 0, 3.2], scale: 0.9, opacity: 0.9, color: [0.1, 0.9, 0.1] };
+
+const draw = async (splats: readonly SplatDescription[], target: Vector3, order: 'center' | 'distance') =>
+  renderCloud(
+    await serialDevice(),
+    cloudOf(splats),
+    cameraAt([0, 0, 0], target, { width: 96, height: 64 }),
+    'classic',
+    {
+      order,
+    },
+  );
+
+/** One image over another, premultiplied. */
+const over = (front: Float32Array, back: Float32Array): Float32Array =>
+  front.map((value, i) => value + (1 - front[4 * Math.floor(i / 4) + 3]) * back[i]);
+
+for (const target of [
+  [0, 0, 3],
+  [0.8, 0, 3],
+  [-0.5, 0.3, 3],
+] as const) {
+  test(`looking to ${target.join(' ')}, the splat ahead covers the one aside`, async () => {
+    const [one, other] = [await draw([aside], target, 'distance'), await draw([ahead], target, 'distance')];
+    const found = await draw([aside, ahead], target, 'distance');
+    const decibels = psnr(found, over(other, one), { channels: 4 });
+    assert.ok(decibels >= LEAST_DB, `${decibels.toFixed(1)} dB`);
+    const wrong = psnr(found, over(one, other), { channels: 4 });
+    assert.ok(wrong < 40, `${wrong.toFixed(1)} dB the other way around: the splats do not overlap`);
+  });
+}
+
+test('by center the order of the same splats is another', async () => {
+  const target: Vector3 = [0, 0, 3];
+  const [byCenter, byDistance] = [
+    await draw([aside, ahead], target, 'center'),
+    await draw([aside, ahead], target, 'distance'),
+  ];
+  assert.ok(psnr(byCenter, byDistance, { channels: 4 }) < 40);
+});
