@@ -5,6 +5,7 @@ import {
   assert,
   assertEqual,
   atRest,
+  claimComing,
   COMPASS,
   delay,
   FIXTURES,
@@ -179,4 +180,12 @@ it('a function of the page changes splats; a wrong one is told of by its line, a
   element.splatShader = null;
   await frames(4);
   assertEqual(await countOf(element, isColored), whole, 'without it all is as before');
+});
+
+it('WebGL 2 draws the scene without them, and says so', async () => {
+  const element = await showLoaded({ ...VIEW, renderer: 'webgl' });
+  const child = document.createElement('splat-cut');
+  element.append(child);
+  await claimComing(/WebGL 2 draws the scene without <splat-cut>/);
+  assert((await countOf(element, isColored)) > 0, 'the scene is there');
 });

@@ -176,11 +176,11 @@ export class Effects implements Mover {
     const { grown = 1, share = 1, cuts = [] } = changes;
     const isChanged = cuts.length > 0 || grown < 1 || share < 1 || this.#shader !== null;
     let modifier = this.#modifiers.get(member);
+    if (isChanged && scene.renderer === 'webgl') return this.#host.warn(NO_WEBGL);
     if (!isChanged || scene.drawn.pages.length === 0) {
       if (modifier) this.#forget(member, modifier);
       return;
     }
-    if (scene.renderer === 'webgl') return this.#host.warn(NO_WEBGL);
     const program = this.#programs.get(scene.device);
     if (!program) return void this.#compile(scene).then(() => this.#host.requestFrame());
     if (modifier?.program !== program) {
