@@ -14,7 +14,7 @@ import {
   showLoaded,
   until,
 } from './support/harness.js';
-import { comesToShow, isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
+import { comesToShow, isBlue, isGreen, isRed, screenOf, type Rgb, type Screen } from './support/screen.js';
 
 const VIEW = {
   'camera-orbit': '0deg 90deg 10m',
@@ -180,6 +180,20 @@ it('a function of the page changes splats; a wrong one is told of by its line, a
   element.splatShader = null;
   await frames(4);
   assertEqual(await countOf(element, isColored), whole, 'without it all is as before');
+});
+
+it('functions of two elements that are compiled at the same time stay apart', async () => {
+  const elements = await Promise.all([showLoaded(VIEW), showLoaded(VIEW)]);
+  const painted = (color: string): string =>
+    `fn modify(splat: Splat, uniforms: Uniforms) -> Splat { var s = splat; s.color = vec3f(${color}); return s; }`;
+  elements[0].splatShader = { code: painted('1.0, 0.0, 0.0') };
+  elements[1].splatShader = { code: painted('0.0, 0.0, 1.0') };
+  const only = (isPicked: (color: Rgb) => boolean): ((screen: Screen) => boolean) => {
+    const others = [isRed, isGreen, isBlue].filter((each) => each !== isPicked);
+    return (screen) => screen.middleOf(isPicked) !== null && others.every((each) => screen.middleOf(each) === null);
+  };
+  assert(await comesToShow(elements[0], only(isRed)), 'the first is red');
+  assert(await comesToShow(elements[1], only(isBlue)), 'the second is blue');
 });
 
 it('WebGL 2 draws the scene without them, and says so', async () => {

@@ -26,6 +26,9 @@ const QUANTIZED: Required<GeometryReading> = {
 const HOOK = modified.sharedSplatHookPart;
 const [, HOOK_NAME] = /\bfn (\w+)/.exec(HOOK)!;
 
+/** Of the names of shaders with a function in them: several may be compiled at a time. */
+let hooks = 0;
+
 /** Programs of a device by the code of the page's function and the types of its uniforms; '' for none. */
 const programsOn = (device: GPUDevice): Map<string, SplatProgram> =>
   perDevice(device, 'splat programs', () => new Map<string, SplatProgram>());
@@ -58,7 +61,7 @@ export class SplatProgram {
     const text = shader ? hookText(shader, HOOK_NAME, modified.projectModified.code) : '';
     let program = programs.get(text);
     if (!program) {
-      program = new SplatProgram(device, shader, `hook${programs.size}`);
+      program = new SplatProgram(device, shader, `hook${hooks++}`);
       const { code } = program.#packed.project;
       if (shader) await requireCompiles(device, code, code.slice(0, code.indexOf(text)));
       programs.set(text, program);
