@@ -234,11 +234,13 @@ export class Measure implements ReactiveController {
   }
 }
 
-/** `1.24 m ± 0.01 m`; without a unit of the file, numbers alone. */
+/** `1.24 m ± 0.01 m`, both with as many decimals; without a unit of the file, numbers alone. */
 function textOf({ length, uncertainty, unit }: MeasureDetail): string {
   const factor = unit ?? 1;
   const suffix = unit === null ? '' : ' m';
-  const number = (value: number): string => (value < 1e-3 ? '0.001' : value.toPrecision(DIGITS).replace(/e\+?/, 'e'));
-  const off = Number.isFinite(uncertainty) ? `${number(uncertainty * factor)}${suffix}` : '?';
-  return `${number(length * factor)}${suffix} ± ${off}`;
+  const value = length * factor;
+  const decimals = Math.max(0, DIGITS - 1 - Math.floor(Math.log10(Math.max(value, 1e-3))));
+  const number = (each: number): string => `${each.toFixed(decimals)}${suffix}`;
+  const off = Number.isFinite(uncertainty) ? number(Math.max(uncertainty * factor, 10 ** -decimals)) : '?';
+  return `${number(value)} ± ${off}`;
 }
