@@ -26,7 +26,7 @@ export default function manifest() {
 }
 
 /** A tag among the element's children. */
-function describeChild({ tagName, attributes, members, events }) {
+function describeChild({ tagName, attributes, members, events = [] }) {
   const own = members.map(describeMember).filter(({ attribute }) => attribute === '');
   return { tag: tagName, attributes: attributes.map(describe), members: own, events: events.map(describe) };
 }
