@@ -36,7 +36,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   if (lane != 0u) { return; }
   var in_front = 1.0;
   for (var run = 0u; run < PROBE_LANES; run++) { in_front *= runs_in_front[run]; }
-  var answer = ProbeAnswer(vec3f(0.0), 0.0, vec3u(0u), in_front);
+  var answer = ProbeAnswer(vec3f(0.0), 0.0, vec3u(0u), in_front, vec3u(0u));
   for (var level = 0u; level < PROBE_LEVELS; level++) { find(&answer, point, level, length); }
   answers[workgroup_id.x] = answer;
 }

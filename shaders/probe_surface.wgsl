@@ -21,7 +21,9 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let slot = answers[at].slots[level];
   let is_here = slot >= page.first_slot && slot < page.first_slot + page.survivors;
   if (!is_here || answers[at].depths[level] == 0.0) { return; }
-  let g = unpack_gaussian(gaussian_at(survivors[slot] - view.first_group * CULL_GROUP));
+  let splat = survivors[slot];
+  answers[at].stored[level] = splat + 1u;
+  let g = unpack_gaussian(gaussian_at(splat - view.first_group * CULL_GROUP));
   let depth = surface_depth(view, g, points[at].pixel);
   if (depth > 0.0) { answers[at].depths[level] = depth; }
 }

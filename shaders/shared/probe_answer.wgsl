@@ -8,6 +8,8 @@ struct ProbeAnswer {
   slots: vec3u,
   // Transmittance of the splats in front of the point's depth.
   in_front: f32,
+  // Numbers of these splats among those of all pages, plus 1; 0 until `probe_surface` has found them.
+  stored: vec3u,
 }
 
 const PROBE_LEVELS = 3u;

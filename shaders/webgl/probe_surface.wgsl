@@ -14,5 +14,5 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4u {
   let question = textureLoad(asked, vec2u(u32(position.x), 0u), 0);
   let i = textureLoad(order, texel_of(question.z), 0).x;
   let depth = surface_depth(view, unpack_gaussian(gaussian_at(i)), bitcast<vec2f>(question.xy));
-  return vec4u(bitcast<u32>(depth), 0u, 0u, 0u);
+  return vec4u(bitcast<u32>(depth), i, 0u, 0u);
 }

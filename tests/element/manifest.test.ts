@@ -155,7 +155,7 @@ check('every member has a type and a description, every parameter a name and a t
   assert.deepEqual(['play', 'toBlob', 'positionFromPoint', 'sharedDevice'].map(typeOf), [
     'Promise<void>',
     'Promise<Blob>',
-    'Promise<ScenePoint | null>',
+    'Promise<PickedPoint | null>',
     'SharedDevice',
   ]);
 });

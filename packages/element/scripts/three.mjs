@@ -8,9 +8,11 @@ export {
   FloatType,
   HalfFloatType,
   LinearMipmapLinearFilter,
+  Raycaster,
   RenderTarget,
   Scene,
   Texture,
+  Vector3,
   WebGPUCoordinateSystem,
   WebGPURenderer,
 } from 'three/webgpu';

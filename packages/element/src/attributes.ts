@@ -310,6 +310,18 @@ export const ATTRIBUTES = {
    */
   iosSrc: text(),
   /**
+   * How dark the shadow is on the ground under what is shown, 0 to 1. It is made of the splats and meshes themselves, once, and anew when they change.
+   * @default `0`: none. AR has one of `1`
+   * @example shadow-intensity="1"
+   */
+  shadowIntensity: text<number | string | null>(),
+  /**
+   * How soft it is, 0 to 1.
+   * @default `1`
+   * @example shadow-softness="0.5"
+   */
+  shadowSoftness: text<number | string | null>(),
+  /**
    * Gives visitors a ruler: a button, then two points by mouse, touch or keyboard. The event `measure` has the length.
    * @example measure
    */

@@ -35,7 +35,7 @@ export type {
 } from './attributes.js';
 export type { ViewName } from './camera/spoken.js';
 export type { SpokenStrings } from './words.js';
-export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
+export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint, type PickedPoint } from './camera/values.js';
 export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';
 export { SceneTimeRanges } from './time-ranges.js';

@@ -3,12 +3,20 @@ import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import { boxPoints } from './camera/box-points.js';
 import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
-import { ScenePoint } from './camera/values.js';
+import { ScenePoint, type PickedPoint } from './camera/values.js';
+import type { SplatChild } from './composition/child.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { ViewController } from './controllers/view-controller.js';
 import { isGone } from './gpu/device-failures.js';
+import type { Member } from './member.js';
+import type { Meshes } from './meshes/meshes.js';
 
 export interface QueryHost {
+  readonly element: Element;
+  readonly sources: {
+    readonly members: readonly Member[];
+    readonly meshes: { readonly value: Pick<Meshes, 'hit'> | undefined };
+  };
   readonly camera: Pick<CameraController, 'viewerFrame'>;
   /** Looks into the last frame. Rejects if it is gone. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
@@ -20,11 +28,15 @@ export interface QueryHost {
 }
 
 /**
- * The visible surface under a point of the page, read back from the GPU beside the frames.
+ * The visible surface under a point of the page, and whose it is, read back from the GPU beside the frames.
  * @param clientX CSS pixels, as of a MouseEvent.
  * @returns null beside the scene, where it is more transparent than not, or if the frame is gone meanwhile.
  */
-export async function positionFromPoint(host: QueryHost, clientX: number, clientY: number): Promise<ScenePoint | null> {
+export async function positionFromPoint(
+  host: QueryHost,
+  clientX: number,
+  clientY: number,
+): Promise<PickedPoint | null> {
   const { camera, view, drawnFrom: drawn, surface } = host;
   const { painter } = view;
   if (drawn === undefined || painter === null || surface === null) return null;
@@ -34,15 +46,45 @@ export async function positionFromPoint(host: QueryHost, clientX: number, client
   try {
     const [answer] = await host.probe([{ x, y }]);
     if (!answer || answer.depth === null) return null;
+    // The shadow belongs to nobody.
+    const placement = answer.splat?.placement;
+    if (placement && !host.sources.members.some((member) => member.placement === placement)) return null;
     const { near, depth, far } = answer;
     const at = (z: number): Vector3 => unproject(drawn, { x, y, depth: z });
     const uncertainty = far === null ? Infinity : distance(at(near ?? depth), at(far)) / 2;
-    return new ScenePoint(...toViewer(camera.viewerFrame, at(depth)), uncertainty);
+    const [eye, place] = [at(0), at(depth)];
+    const point = new ScenePoint(...toViewer(camera.viewerFrame, place), uncertainty);
+    return Object.assign(point, { distance: distance(eye, place), ...whose(host, answer, eye, place) });
   } catch (error) {
     // A device that was lost meanwhile has nothing more to say, and its loss is told elsewhere.
     if (await isGone(painter)) return null;
     throw error;
   }
+}
+
+/** The element that a surface belongs to, and what part of it was met. */
+function whose(
+  { element, sources, camera }: QueryHost,
+  { splat }: ProbeAnswer,
+  eye: Vector3,
+  place: Vector3,
+): Pick<PickedPoint, 'element' | 'splat' | 'mesh' | 'material'> {
+  const childOf = (isIt: (member: Member) => boolean): Element =>
+    [...element.children].find((child) => {
+      const member = (child as Partial<SplatChild>).holder?.member;
+      return member !== undefined && isIt(member);
+    }) ?? element;
+  if (splat) {
+    const { placement, index } = splat;
+    return { element: childOf((member) => member.placement === placement), splat: index, mesh: null, material: null };
+  }
+  const [origin, direction] = [eye, subtract(place, eye)].map((v) => toViewer(camera.viewerFrame, v));
+  const length = Math.hypot(...direction);
+  const ahead: Vector3 = [direction[0] / length, direction[1] / length, direction[2] / length];
+  const hit = sources.meshes.value?.hit(origin, ahead);
+  if (!hit) return { element, splat: null, mesh: null, material: null };
+  const { member: owner, mesh, material } = hit;
+  return { element: childOf((member) => member === owner), splat: null, mesh, material };
 }
 
 const distance = (a: Vector3, b: Vector3): number => Math.hypot(...subtract(a, b));

@@ -14,6 +14,7 @@ import type { SplatSceneElement } from './composition/splat-scene.js';
 
 export type { ChildEventMap } from './composition/child.js';
 export { SplatCutElement } from './effects/splat-cut.js';
+export type { ScenePointerEvent } from './composition/interaction.js';
 export { SplatMeshElement } from './composition/splat-mesh.js';
 export { SplatSceneElement } from './composition/splat-scene.js';
 

@@ -7,7 +7,7 @@ import { Behaviours, type BehaviourHost } from './behaviours.js';
 import type { CameraAction } from './camera/gestures.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import { frameOf } from './camera/settings.js';
-import type { ScenePoint } from './camera/values.js';
+import type { PickedPoint } from './camera/values.js';
 import { CameraController } from './controllers/camera-controller.js';
 import type { HotspotHost } from './controllers/hotspot-controller.js';
 import type { InputHost, InputOptions } from './controllers/input-controller.js';
@@ -92,7 +92,7 @@ export class Stage
     },
     this.#update,
   );
-  /** VR, AR and the ruler. */
+  /** VR, AR, the ruler and the shadow. */
   readonly extras = new Lazy(
     'the code for VR, AR and measuring',
     async () => new (await import('./xr/extras.js')).Extras(this.element, this),
@@ -313,7 +313,7 @@ export class Stage
   }
 
   /** The visible surface under a point of the page: see the element's method of this name. */
-  async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
+  async positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
     const { positionFromPoint } = await queries.get();
     return positionFromPoint(this, clientX, clientY);
   }
@@ -521,9 +521,9 @@ export class Stage
     if (!this.sources.own.isLeaving) this.playback.keepScene();
     if (this.attributes.views) this.tour.want(this.#warnOf);
     if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
-    const { vr, ar, measure, revealEffect } = this.attributes;
+    const { vr, ar, measure, shadowIntensity, revealEffect } = this.attributes;
     if (revealEffect || this.source.splatShader) this.effects.want(this.#warnOf);
-    if (vr || ar || measure) this.extras.want(this.#warnOf);
+    if (vr || ar || measure || shadowIntensity) this.extras.want(this.#warnOf);
     if (this.input.enabled) this.#hands.want(this.#warnOf);
     this.reveal.settle();
     this.sources.request();

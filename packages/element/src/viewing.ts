@@ -1,5 +1,5 @@
 import { loadModule } from '@gaussian-splat/core';
-import type { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
+import type { CameraOrbit, CameraTarget, FieldOfView, PickedPoint } from './camera/values.js';
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
 import { boxOf, type SceneBox } from './scene-queries.js';
@@ -116,11 +116,11 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /**
    * The visible surface of the scene under a point of the page: what `data-position` and `camera-target` take. Asks the GPU, beside the
-   * frames. `uncertainty` of the point says how far the surface spreads along the line of sight.
+   * frames. `uncertainty` of the point says how far the surface spreads along the line of sight, `element`, `splat`, `mesh` and `material` what was met.
    * @param clientX CSS pixels, as of a MouseEvent.
    * @returns null beside the scene, and where it is more transparent than not.
    */
-  positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
+  positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
     return this.stage.positionFromPoint(clientX, clientY);
   }
 

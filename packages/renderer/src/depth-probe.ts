@@ -6,6 +6,7 @@ import { BUFFER_USAGE, kernelOf, type ShaderDescription } from './gpu/kernel.js'
 import { GpuMemory } from './gpu/memory.js';
 import { readBack } from './gpu/read-back.js';
 import { Stage } from './stages/stage.js';
+import type { Placement } from './world.js';
 
 /** A point of the image that was drawn last. */
 export interface ProbePoint {
@@ -32,6 +33,19 @@ export interface ProbeAnswer {
   readonly far: number | null;
   /** 0..1: light that the splats in front of the point's own depth let pass. 1: nothing hides it. */
   readonly transmittance: number;
+  /** The splat that {@link ProbeAnswer.depth} is of. Null where that is, and where something else than a splat is nearer. */
+  readonly splat: ProbedSplat | null;
+}
+
+/** A splat of a scene. */
+export interface ProbedSplat {
+  /** Its place in the world; undefined where one scene is drawn alone: with WebGL. */
+  readonly placement: Placement | undefined;
+  /**
+   * Its number among those of its scene, in the order in which they are stored: of a file, `packedOrder` has their rows. Null where a scene has levels of detail, whose
+   * splats stand for several.
+   */
+  readonly index: number | null;
 }
 
 /** The frame to look into. */
@@ -45,6 +59,8 @@ export const probeDepthStage = (device: GPUDevice): Stage<typeof probeDepth> => 
 
 const { storage, copySource, copyDestination } = BUFFER_USAGE;
 const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
+/** Word of an answer with the number of the splat of its middle depth. */
+const STORED_AT = layouts.ProbeAnswer.fields.stored.offset / 4 + 1;
 
 /**
  * Looks into the frame that was drawn last, whatever rasterizer drew it. Reads back: for clicks and labels, not for every frame.
@@ -76,7 +92,7 @@ export async function probe(
     surfaces.end();
     encoder.copyBufferToBuffer(kept, 0, order[0], 0, kept.size);
     const [found] = await readBack(device, [{ buffer: answers }], encoder);
-    return readAnswers(new Float32Array(found), points.length);
+    return readAnswers(found, points.length, (stored) => source.bindings.table.splatAt(stored));
   } finally {
     memory.destroy();
   }
@@ -102,11 +118,15 @@ function recordSurfaces(
   });
 }
 
-function readAnswers(values: Float32Array, count: number): ProbeAnswer[] {
-  return Array.from({ length: count }, (_, i) => {
-    const [near, depth, far, opacity, , , , transmittance] = values.subarray(i * WORDS_PER_ANSWER);
+function readAnswers(found: ArrayBuffer, points: number, splatOf: (stored: number) => ProbedSplat): ProbeAnswer[] {
+  const [values, words] = [new Float32Array(found), new Uint32Array(found)];
+  return Array.from({ length: points }, (_, i) => {
+    const at = i * WORDS_PER_ANSWER;
+    const [near, depth, far, opacity, , , , transmittance] = values.subarray(at);
     const [nearest, surface, farthest] = [near, depth, far].map((value) => (value > 0 ? value : null));
-    return { opacity, depth: surface, near: nearest, far: farthest, transmittance };
+    const stored = words[at + STORED_AT];
+    const splat = surface === null || stored === 0 ? null : splatOf(stored - 1);
+    return { opacity, depth: surface, near: nearest, far: farthest, transmittance, splat };
   });
 }
 

@@ -1,4 +1,5 @@
 import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
+import type { ProbedSplat } from './depth-probe.js';
 import type { GaussianPage, PageRequests } from './gaussian-scene.js';
 import type { GeometryReading } from './geometry-reading.js';
 import { constants, layouts } from './generated/shaders.js';
@@ -93,6 +94,17 @@ export class PageTable {
   readingOf(page: number): GeometryReading | undefined {
     const { reading } = this.pages[page];
     return this.#placementOf[page].modifier?.reading(reading) ?? reading;
+  }
+
+  /** Whose the splat of a number among those of all pages is. */
+  splatAt(stored: number): ProbedSplat {
+    const group = Math.floor(stored / constants.CULL_GROUP);
+    const page = this.#firstGroups.findIndex((first, i) => first <= group && group < (this.#firstGroups[i + 1] ?? 0));
+    const placement = this.#placementOf[page];
+    if (this.#pages[page].details) return { placement, index: null };
+    const own = this.#placementOf.indexOf(placement);
+    const before = this.#pages.slice(own, page).reduce((sum, { count }) => sum + count, 0);
+    return { placement, index: before + stored - constants.CULL_GROUP * this.#firstGroups[page] };
   }
 
   /** True if a scene is streamed. */

@@ -4,6 +4,7 @@ import { check, randomSource, type Bench, type StageCase } from '../../support/g
 
 const ALPHA_MIN = 1 / 255;
 const ALPHA_MAX = 0.999;
+const WORDS = layouts.ProbeAnswer.size / 4;
 
 interface Splat {
   readonly x: number;
@@ -114,12 +115,12 @@ async function checkProbe(bench: Bench, count: number, maxOpacity: number): Prom
     const { opacity, depths, inFront, margins } = twin(nearToFar, point);
     const near = (actual: number, expected: number, what: string): void =>
       check(Math.abs(actual - expected) < 1e-5, `${what} of point ${i}: ${actual}, expected ${expected}`);
-    near(found[8 * i + 3], opacity, 'opacity');
+    near(found[WORDS * i + 3], opacity, 'opacity');
     // If the light comes within a rounding of a share, float32 may name the next splat.
     depths.forEach((depth, k) => {
-      if (margins[k] > 1e-5) near(found[8 * i + k], depth, `depth at ${LEFT[k]}`);
+      if (margins[k] > 1e-5) near(found[WORDS * i + k], depth, `depth at ${LEFT[k]}`);
     });
-    near(found[8 * i + 7], inFront, 'transmittance in front');
+    near(found[WORDS * i + 7], inFront, 'transmittance in front');
   });
 }
 

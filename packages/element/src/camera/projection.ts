@@ -11,15 +11,18 @@ export interface Projected {
 }
 
 /** A point of the scene's frame, as the camera sees it. */
-export function project({ worldToCamera: m, fx, fy, cx, cy }: Camera, [x, y, z]: Vector3): Projected {
+export function project({ worldToCamera: m, fx, fy, cx, cy, orthographic }: Camera, [x, y, z]: Vector3): Projected {
   const row = (r: number): number => m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
   const depth = row(2);
-  return { x: (fx * row(0)) / depth + cx, y: (fy * row(1)) / depth + cy, depth };
+  const shrink = orthographic ? 1 : depth;
+  return { x: (fx * row(0)) / shrink + cx, y: (fy * row(1)) / shrink + cy, depth };
 }
 
 /** The point of the scene's frame that lies at a depth behind a place in the picture: the inverse of {@link project}. */
-export function unproject({ worldToCamera: m, fx, fy, cx, cy }: Camera, { x, y, depth }: Projected): Vector3 {
-  const inCamera = [(depth * (x - cx)) / fx - m[3], (depth * (y - cy)) / fy - m[7], depth - m[11]];
+export function unproject(camera: Camera, { x, y, depth }: Projected): Vector3 {
+  const { worldToCamera: m, fx, fy, cx, cy, orthographic } = camera;
+  const stretch = orthographic ? 1 : depth;
+  const inCamera = [(stretch * (x - cx)) / fx - m[3], (stretch * (y - cy)) / fy - m[7], depth - m[11]];
   // The matrix is a rotation and a translation, so its transpose takes directions back.
   const column = (c: number): number => m[c] * inCamera[0] + m[4 + c] * inCamera[1] + m[8 + c] * inCamera[2];
   return [column(0), column(1), column(2)];

@@ -63,6 +63,23 @@ export class ScenePoint {
   }
 }
 
+/** A point of the visible surface under a point of the page, and whose it is. */
+export interface PickedPoint extends ScenePoint {
+  /** The `<splat-scene>` or `<splat-mesh>` that was met, or the `<gaussian-splat>` itself for its own scene. */
+  readonly element: Element;
+  /** From the eye, in units of viewer space. */
+  readonly distance: number;
+  /**
+   * Number of the splat among those of its scene, in the order in which the renderer stores them; null for a mesh, and where levels of detail are drawn. Of a file, `packedOrder` of
+   * `@gaussian-splat/renderer/tools` has the rows.
+   */
+  readonly splat: number | null;
+  /** Name of the triangle mesh in its file, empty where it has none; null for splats. */
+  readonly mesh: string | null;
+  /** Name of its material, likewise. */
+  readonly material: string | null;
+}
+
 /** Vertical field of view. */
 export class FieldOfView {
   constructor(radians: number) {

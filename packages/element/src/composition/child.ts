@@ -13,6 +13,8 @@ import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
 import type { Member } from '../member.js';
 import { SourceEntry, type EntryStage, type SourceOwner } from '../source-entry.js';
 import { cameraInScene, isSolid, matrixOf, matrixOfFrame, readMatrix, sceneToWorld, transposed } from './placing.js';
+import { Lazy } from '../lazy.js';
+import type { Interaction, InteractionHost, ScenePointerEvent } from './interaction.js';
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
 
@@ -34,18 +36,22 @@ export interface ChildPlace {
 const UP: Vector3 = [0, 1, 0];
 const NO_VALUES: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
 
-/** Events of a child of `<gaussian-splat>`, with the meanings that they have there. None of them bubbles. */
-export type ChildEventMap = Omit<
-  GaussianSplatEventMap,
-  | 'camera-change'
-  | 'poster-dismissed'
-  | 'shader-error'
-  | 'model-visibility'
-  | 'contextlost'
-  | 'contextrestored'
-  | 'loadeddata'
-  | 'canplay'
->;
+/** Events of a child of `<gaussian-splat>`, with the meanings that they have there. Only those of pointers bubble. */
+export type ChildEventMap = Record<
+  'click' | 'pointerover' | 'pointerout' | 'pointerenter' | 'pointerleave',
+  ScenePointerEvent
+> &
+  Omit<
+    GaussianSplatEventMap,
+    | 'camera-change'
+    | 'poster-dismissed'
+    | 'shader-error'
+    | 'model-visibility'
+    | 'contextlost'
+    | 'contextrestored'
+    | 'loadeddata'
+    | 'canplay'
+  >;
 
 /** The properties that a page may set, for the typings of frameworks. */
 export type SettableOf<Table> = Partial<
@@ -66,7 +72,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   constructor() {
     super();
     // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
-    Object.assign(this, { autoplay: false, loop: false, hidden: false });
+    Object.assign(this, { autoplay: false, loop: false, interactive: false, hidden: false });
   }
 
   /**
@@ -269,6 +275,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   protected override updated(): void {
     this.holder.update();
     this.holder.requestFrame();
+    interactionChanged(this);
   }
 }
 
@@ -298,11 +305,36 @@ export const childDeclarations = (
   playbackRate: { attribute: false, noAccessor: true },
 });
 
+/** What children ask of the element around them. */
+export type ChildStage = EntryStage & InteractionHost;
+
 /** The stages of elements that have children. */
-export const stages = new WeakMap<Element, EntryStage>();
+export const stages = new WeakMap<Element, ChildStage>();
+
+const interactions = new WeakMap<Element, Lazy<Interaction>>();
+
+/** Lets visitors click the children of an element, once one of them wants it. */
+function interactionChanged(child: SplatChild): void {
+  const parent = child.parentElement;
+  const stage = parent && stages.get(parent);
+  if (!stage) return;
+  let code = interactions.get(parent);
+  if (code === undefined) {
+    if (!child.interactive) return;
+    code = new Lazy('the code of clicks on scenes', async () => {
+      const { Interaction } = await import('./interaction.js');
+      return new Interaction(stage);
+    });
+    interactions.set(parent, code);
+  }
+  if (code.value) code.value.update();
+  else code.want(({ message }) => child.warn(message));
+}
 
 /** Gives a child to its element. One that has not looked at its children yet asks for them itself. */
 export function adopt(child: SplatChild): void {
   const { parentElement } = child;
+  // Its first update may have come before its element looked at its children.
+  interactionChanged(child);
   child.holder.attach((parentElement && stages.get(parentElement)) ?? null);
 }

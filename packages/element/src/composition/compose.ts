@@ -1,6 +1,5 @@
 /** Loaded when an element has its first child that is a scene or a mesh. */
-import type { EntryStage } from '../source-entry.js';
-import { adopt, SplatChild, stages } from './child.js';
+import { adopt, SplatChild, stages, type ChildStage } from './child.js';
 import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
 
@@ -12,7 +11,7 @@ export function define(): void {
 }
 
 /** Lets an element show its children. */
-export function compose(stage: EntryStage): void {
+export function compose(stage: ChildStage): void {
   stages.set(stage.element, stage);
   define();
   for (const child of stage.element.children) if (child instanceof SplatChild) adopt(child);

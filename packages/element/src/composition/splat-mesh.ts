@@ -19,6 +19,9 @@ import { childDeclarations, SplatChild } from './child.js';
  * @fires {CustomEvent<LoadDetail>} load - It is shown.
  * @fires {ProgressEvent} progress - Bytes have arrived.
  * @fires {CustomEvent<ElementError>} error - It cannot be shown; `detail` is the same object as the property `error`. The others stay.
+ * @fires {ScenePointerEvent} click - With `interactive`: a visitor has clicked it, by pointer or key. Bubbles.
+ * @fires {ScenePointerEvent} pointerover - With `interactive`: the pointer has come over it. Bubbles.
+ * @fires {ScenePointerEvent} pointerout - With `interactive`: the pointer has left it. Bubbles.
  * @fires {Event} play - As of HTMLMediaElement: its own clock runs.
  * @fires {Event} pause - Its own clock stands still.
  * @fires {Event} ended - Its own clock has come to its end.

@@ -23,6 +23,9 @@ type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
  * @fires {CustomEvent<ElementError>} error - It cannot be shown; `detail` is the same object as the property `error`. The others stay.
  * @fires {Event} inputs-change - The inputs that the page may set are others; `inputs` has them.
  * @fires {CustomEvent<ElementError>} generator-error - A run of its generator failed; the last good frame stays.
+ * @fires {ScenePointerEvent} click - With `interactive`: a visitor has clicked it, by pointer or key. Bubbles.
+ * @fires {ScenePointerEvent} pointerover - With `interactive`: the pointer has come over it. Bubbles.
+ * @fires {ScenePointerEvent} pointerout - With `interactive`: the pointer has left it. Bubbles.
  * @fires {Event} play - As of HTMLMediaElement: its own clock runs.
  * @fires {Event} pause - Its own clock stands still.
  * @fires {Event} ended - Its own clock has come to its end.

@@ -1,4 +1,4 @@
-import { multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
+import { multiply, type Camera, type Matrix4, type Vector3 as Point } from '@gaussian-splat/core';
 import { SceneDepth, type FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import {
@@ -6,14 +6,18 @@ import {
   DepthTexture,
   FloatType,
   HalfFloatType,
+  Raycaster,
   RenderTarget,
   Scene,
+  Vector3,
   WebGPUCoordinateSystem,
   WebGPURenderer,
   type CubeRenderTarget,
   type Group,
+  type Mesh,
 } from './three.js';
 import type { ViewerFrame } from '../camera/orbit.js';
+import type { MeshModel } from '../gpu/loaded-gaussians.js';
 import type { Frame } from '../live/frame-filter.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
 import type { PlacedModel } from './meshes.js';
@@ -32,6 +36,13 @@ const [OPAQUE, TRANSPARENT] = [0, 1];
 interface Drawn {
   readonly color: GPUTexture;
   readonly texture: GPUTexture;
+}
+
+/** What a ray has met: names as the file has them, empty where it has none. */
+export interface MeshHit {
+  readonly model: MeshModel;
+  readonly mesh: string;
+  readonly material: string;
 }
 
 /** Draws meshes with three.js on the element's device, as layers of color and depth that splats are painted among. */
@@ -126,15 +137,31 @@ export class MeshLayer {
   async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
     const { width = 0, height = 0 } = this.#resolve.depth ?? {};
     const within = (at: number, size: number): number => Math.min(size - 1, Math.max(0, Math.floor(at)));
-    const near = this.#near;
+    const nearPlane = this.#near;
     const stored = await this.#resolve.read(points.map(({ x, y }) => [within(x, width), within(y, height)]));
     return answers.map((answer, i) => {
-      const mesh = near / stored[i];
+      const mesh = nearPlane / stored[i];
       const { depth: asked } = points[i];
       if (asked !== undefined) return mesh < asked ? { ...answer, transmittance: 0 } : answer;
       if (mesh >= (answer.depth ?? Infinity)) return { ...answer, far: Math.min(answer.far ?? mesh, mesh) };
-      return { ...answer, near: Math.min(answer.near ?? mesh, mesh), depth: mesh, far: mesh, transmittance: 0 };
+      const near = Math.min(answer.near ?? mesh, mesh);
+      return { ...answer, near, depth: mesh, far: mesh, transmittance: 0, splat: null };
     });
+  }
+
+  /** The first triangle that a ray meets, as of the last frame: origin and direction in viewer space. */
+  hit(origin: Point, direction: Point): MeshHit | null {
+    const ray = new Raycaster(new Vector3(...origin), new Vector3(...direction));
+    ray.layers.enableAll();
+    let first: (MeshHit & { readonly distance: number }) | null = null;
+    for (const [model, root] of this.#shown) {
+      const [met] = ray.intersectObject(root, true);
+      if (!met || met.distance >= (first?.distance ?? Infinity)) continue;
+      const { object, face, distance } = met;
+      const material = [(object as Mesh).material].flat()[face?.materialIndex ?? 0];
+      first = { model, mesh: object.name, material: material?.name ?? '', distance };
+    }
+    return first;
   }
 
   destroy(): void {

@@ -1,5 +1,5 @@
 /** Loaded when an element has meshes: three.js is behind this module. */
-import { multiply, type Matrix4 } from '@gaussian-splat/core';
+import { multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import { credentialsOf } from '../attributes.js';
@@ -9,7 +9,7 @@ import type { Frame } from '../live/frame-filter.js';
 import type { SourceEntry } from '../source-entry.js';
 import type { Member } from '../member.js';
 import type { ViewerFrame } from '../camera/orbit.js';
-import { MeshLayer } from './mesh-layer.js';
+import { MeshLayer, type MeshHit } from './mesh-layer.js';
 import type { Model } from './model.js';
 import { fetchMesh, openModel } from './open-mesh.js';
 
@@ -97,6 +97,13 @@ export class Meshes {
   /** Ends what was found of splats where a mesh is nearer. */
   async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
     return this.#layer && this.#models.length > 0 ? this.#layer.probe(points, answers) : answers;
+  }
+
+  /** Whose triangle a ray meets first, and the names of the mesh and its material; null for none. Origin and direction in viewer space. */
+  hit(origin: Vector3, direction: Vector3): (Omit<MeshHit, 'model'> & { readonly member: Member }) | null {
+    const met = this.#layer?.hit(origin, direction);
+    const member = met && this.#sources.members.find(({ scene }) => scene.model === met.model);
+    return member ? { member, mesh: met.mesh, material: met.material } : null;
   }
 
   /** Frees what nothing needs any more. */

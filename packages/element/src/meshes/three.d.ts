@@ -9,9 +9,22 @@ export class Matrix4 {
   invert(): this;
 }
 export class Vector3 {
+  constructor(x?: number, y?: number, z?: number);
   x: number;
   y: number;
   z: number;
+}
+/** Where a ray meets a triangle. */
+export interface Intersection {
+  readonly distance: number;
+  readonly object: Object3D;
+  readonly face?: { readonly materialIndex: number } | null;
+}
+export class Raycaster {
+  constructor(origin: Vector3, direction: Vector3);
+  readonly layers: Layers;
+  /** Nearest first. */
+  intersectObject(object: Object3D, recursive: boolean): Intersection[];
 }
 export class Box3 {
   min: Vector3;
@@ -85,6 +98,7 @@ export function sRGBTransferOETF(color: ShaderNode): ShaderNode;
 export function vec4(rgb: ShaderNode, a: ShaderNode): ShaderNode;
 
 export class Material {
+  name: string;
   /** Of glTF's `KHR_materials_unlit`. */
   readonly isMeshBasicMaterial?: true;
   envMap?: Texture | null;

@@ -1,3 +1,4 @@
+import type { Camera } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import {
   distanceView,
@@ -26,7 +27,9 @@ interface CopySurface extends Surface {
 export class GlPainter implements Painter {
   readonly filter = undefined;
   readonly isPrepared = true;
-  readonly #scene: GlLoaded;
+  readonly scene: GlLoaded;
+  /** Draws what lies beneath the splats, into the context's canvas. */
+  beneath: ((camera: Camera) => void) | undefined;
   readonly #sorter: DepthSorter;
   readonly #overdraw = new OverdrawLimit();
   /** The view that the order on the GPU is of. */
@@ -48,7 +51,7 @@ export class GlPainter implements Painter {
   #isDestroyed = false;
 
   constructor(scene: GlLoaded, events: PainterEvents) {
-    this.#scene = scene;
+    this.scene = scene;
     let tellOrdered: () => void;
     this.#ordered = new Promise((resolve) => (tellOrdered = resolve));
     this.#shown = new Promise((resolve) => (this.#tellShown = resolve));
@@ -67,7 +70,7 @@ export class GlPainter implements Painter {
   }
 
   get place(): Place {
-    return this.#scene.place;
+    return this.scene.place;
   }
 
   get device(): GPUDevice {
@@ -81,11 +84,11 @@ export class GlPainter implements Painter {
   }
 
   get byteLength(): number {
-    return this.#scene.frames.byteLength;
+    return this.scene.frames.byteLength;
   }
 
   get isLost(): boolean {
-    return this.#scene.isLost;
+    return this.scene.isLost;
   }
 
   get isDestroyed(): boolean {
@@ -124,7 +127,7 @@ export class GlPainter implements Painter {
     if (onTime === undefined) return this.#draw(frame);
     const { resolutionScale = 1 } = frame.levers ?? {};
     const least = SURE_SHARE * this.#wholeMs * resolutionScale ** 2;
-    this.#scene.lease.clock
+    this.scene.lease.clock
       .time(() => this.#draw(frame), least)
       .then((time) => {
         if (resolutionScale === 1) this.#wholeMs = Math.min(this.#wholeMs || Infinity, time.atMost);
@@ -137,22 +140,22 @@ export class GlPainter implements Painter {
   async renderFirst(frame: CanvasFrame): Promise<void> {
     this.#ask(this.#viewOf(frame));
     // A painter that is destroyed meanwhile gets no order, and the next scene waits for the end of this frame.
-    await Promise.race([this.#ordered, this.#shown, this.#scene.lost]);
+    await Promise.race([this.#ordered, this.#shown, this.scene.lost]);
     if (this.isLost || this.#isDestroyed) return;
     const begin = performance.now();
     this.#paint(frame);
-    await whenDrawn(this.#scene.lease.gl).catch(() => undefined);
+    await whenDrawn(this.scene.lease.gl).catch(() => undefined);
     this.#wholeMs = performance.now() - begin;
     if (!this.isLost && !this.#isDestroyed) this.#show(frame);
   }
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
-    await Promise.race([this.#shown, this.#scene.lost]);
-    return this.isLost || this.#isDestroyed ? [] : this.#scene.frames.probe(points);
+    await Promise.race([this.#shown, this.scene.lost]);
+    return this.isLost || this.#isDestroyed ? [] : this.scene.frames.probe(points);
   }
 
   async readCounts(): Promise<ReadCounts> {
-    return { drawn: this.#scene.frames.countDrawn(), left: 0, contributed: null };
+    return { drawn: this.scene.frames.countDrawn(), left: 0, contributed: null };
   }
 
   destroy(): void {
@@ -169,7 +172,7 @@ export class GlPainter implements Painter {
 
   #viewOf({ camera }: CanvasFrame): OrderView {
     const viewOf = this.#rendering.order === 'distance' ? distanceView : orderView;
-    return viewOf(camera, this.#scene.gaussians.origin);
+    return viewOf(camera, this.scene.gaussians.origin);
   }
 
   #ask(view: OrderView): void {
@@ -183,8 +186,8 @@ export class GlPainter implements Painter {
     if (this.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
     this.#sorted = view;
     this.#sortedAt = askedAt;
-    this.#overdraw.note(covered, this.#scene.gaussians.count);
-    this.#scene.frames.setOrder(order, count);
+    this.#overdraw.note(covered, this.scene.gaussians.count);
+    this.scene.frames.setOrder(order, count);
   }
 
   #draw(frame: CanvasFrame): void {
@@ -194,7 +197,7 @@ export class GlPainter implements Painter {
 
   #paint({ camera, levers }: CanvasFrame): void {
     const { quality, shDegree, filter } = this.#rendering;
-    this.#scene.frames.render({
+    this.scene.frames.render({
       ...{ camera, shDegree, filter },
       accumulation: quality === 'balanced' || quality === 'fast' ? 'rgba16float' : 'rgba32float',
       resolutionScale: this.pixelShare * (levers?.resolutionScale ?? 1),
@@ -202,11 +205,18 @@ export class GlPainter implements Painter {
   }
 
   /** Copies what was painted to the element's canvas. */
-  #show({ camera: { width, height }, background, surface }: CanvasFrame): void {
+  #show({ camera, background, surface }: CanvasFrame): void {
+    const { width, height } = camera;
     const { context } = surface as CopySurface;
-    const { lease } = this.#scene;
+    const { lease } = this.scene;
     lease.fit(width, height);
-    this.#scene.frames.present(background);
+    if (this.beneath) {
+      const { gl } = lease;
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+      gl.clearBufferfv(gl.COLOR, 0, background ?? [0, 0, 0, 0]);
+      this.beneath(camera);
+      this.scene.frames.present(undefined, { keeps: true });
+    } else this.scene.frames.present(background);
     const { canvas } = lease.gl;
     // WebGL counts rows from below, so that is where a smaller image lies.
     context.globalCompositeOperation = 'copy';

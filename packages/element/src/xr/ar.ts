@@ -4,7 +4,11 @@ import { toViewer } from '../camera/orbit.js';
 import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
 import { AR_STYLES, ArOverlay } from './ar-overlay.js';
-import { MarkerSplats } from './marker-splats.js';
+import { readShadow } from '../shadow/shadow-controller.js';
+import { shadowSplats, takeShadow } from '../shadow/shadow-map.js';
+import { alphaOfScene } from '../shadow/take-alpha-gl.js';
+import { MarkerSplats, placeOf } from './marker-splats.js';
+import type { XrScene } from './xr-scene.js';
 import { SimplifiedModel } from './simplified-model.js';
 import { metersOf, unitOf } from './vr.js';
 import type { XrFrame, XrHit, XrAnchor, XrHitTestSource, XrInput, XrPose } from './webxr.js';
@@ -21,8 +25,6 @@ const SNAP = 0.05;
 const DOWN = (20 * Math.PI) / 180;
 /** Of the subject's splats, the share that lies below the floor. */
 const BELOW = 0.01;
-/** Of the object's radius, that of the disc under it. */
-const DISC = 0.8;
 
 /** Where the subject of a scene stands on its floor. */
 interface Footprint {
@@ -81,7 +83,7 @@ class ArGuide implements XrGuide {
   readonly #stage: XrHost;
   readonly #of: XrStarted;
   readonly #overlay: ArOverlay;
-  readonly #disc: MarkerSplats;
+  #shadow: { readonly splats: MarkerSplats; readonly half: number } | undefined;
   readonly #unit: number;
   #source: XrHitTestSource | undefined;
   #footprint: Footprint | undefined;
@@ -96,7 +98,6 @@ class ArGuide implements XrGuide {
     this.#stage = stage;
     this.#of = of;
     this.#overlay = overlay;
-    this.#disc = new MarkerSplats(of.gl, 'disc', stage.services.sceneLoader, of.signal);
     const unit = unitOf(stage);
     if (unit === undefined && stage.attributes.arScale === 'fixed')
       stage.warn(
@@ -119,6 +120,7 @@ class ArGuide implements XrGuide {
       this.#footprint = footprintOf(this.#stage, found.positions, found.origin);
       loop.crop(this.#footprint.positions);
       this.#scale = this.#firstScale(this.#footprint);
+      this.#castShadow(found, this.#footprint).catch(({ message }: Error) => this.#stage.warn(message));
     }
     if (!this.#at) this.#look(frame, pose);
     if (!this.#at) return null;
@@ -132,7 +134,26 @@ class ArGuide implements XrGuide {
     at: Parameters<NonNullable<XrGuide['drawBelow']>>[1],
   ): void {
     if (!this.#at || !this.#footprint || this.#isWall) return;
-    this.#disc.draw(camera, at, this.#at, DISC * this.#footprint.radius * this.#scale * this.#unit);
+    if (!this.#shadow) return;
+    const { splats, half } = this.#shadow;
+    splats.draw(camera, at, placeOf(this.#at, half * this.#scale * this.#unit, this.#turn));
+  }
+
+  /** The same shadow as in the page, of the subject alone. */
+  async #castShadow({ renderer }: XrScene, { positions, radius }: Footprint): Promise<void> {
+    const { gl, signal } = this.#of;
+    const { camera, frame, services, attributes } = this.#stage;
+    const kept = Uint32Array.from(positions.keys()).filter(
+      (i) => 3 * i < positions.length && positions[3 * i] === positions[3 * i],
+    );
+    const { take, free } = alphaOfScene(gl, renderer, kept);
+    const center = toViewer(frame, camera.bounds.center);
+    const map = await takeShadow({ center, radius, frame }, take).finally(free);
+    if (map === null || signal.aborted) return;
+    const { intensity, softness } = readShadow(this.#stage);
+    const rows = shadowSplats(map, attributes.shadowIntensity ? intensity : 1, softness);
+    const splats = new MarkerSplats(gl, rows, services.sceneLoader, signal);
+    this.#shadow = { splats, half: map.half };
   }
 
   get #isWall(): boolean {

@@ -1,6 +1,7 @@
-/** Loaded where an element has one of the attributes `vr`, `ar` and `measure`. */
+/** Loaded where an element has one of the attributes `vr`, `ar`, `measure` and `shadow-intensity`. */
 import { css, type ReactiveControllerHost } from 'lit';
 import { Lazy } from '../lazy.js';
+import type { ShadowHost } from '../shadow/shadow-controller.js';
 import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
 import type { XrOffer } from './xr-offer.js';
@@ -36,8 +37,9 @@ export class Extras {
   readonly vr: Lazy<XrOffer>;
   readonly ar: Lazy<XrOffer>;
   readonly measure: Lazy<unknown>;
+  readonly shadow: Lazy<unknown>;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost) {
+  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost & ShadowHost) {
     adoptStyles(element.shadowRoot!, STYLES);
     const place = element.ownerDocument.createElement('div');
     place.className = 'extras';
@@ -67,8 +69,13 @@ export class Extras {
       },
       update,
     );
+    this.shadow = new Lazy('the code for shadows', async () => {
+      const { ShadowController } = await import('../shadow/shadow-controller.js');
+      return new ShadowController(stage);
+    });
     const warn = ({ message }: Error): void => stage.warn(message);
     const find = ({ attributes }: XrHost): void => {
+      if (attributes.shadowIntensity) this.shadow.want(warn);
       if (attributes.vr) this.vr.want(warn);
       if (attributes.ar) this.ar.want(warn);
       if (attributes.measure) this.measure.want(warn);

@@ -5,7 +5,7 @@ import { lengthGrammar, optionalLengthGrammar } from '../camera/lengths.js';
 import { prefersReducedMotion } from '../controllers/motion.js';
 import type { XrHost } from './xr-host.js';
 import { openFloor } from '../walk/floor-source.js';
-import { MarkerSplats } from './marker-splats.js';
+import { MarkerSplats, placeOf, ring } from './marker-splats.js';
 import { VrRig } from './vr-rig.js';
 import type { XrKind, XrStarted } from './xr-offer.js';
 import type { XrGuide } from './xr-session.js';
@@ -60,13 +60,13 @@ function guideOf(stage: XrHost, { session, space, spaceType, signal, gl }: XrSta
     (map) => map && !signal.aborted && (rig.map = map),
     () => undefined,
   );
-  const marker = new MarkerSplats(gl, 'ring', stage.services.sceneLoader, signal);
+  const marker = new MarkerSplats(gl, ring(), stage.services.sceneLoader, signal);
   return {
     background: BACKGROUND,
     place: (frame, pose, seconds) => rig.place(frame, pose, space, seconds),
     drawAbove: (camera, at) => {
       const place = rig.targetInSpace;
-      if (place) marker.draw(camera, at, place);
+      if (place) marker.draw(camera, at, placeOf(place));
     },
   };
 }

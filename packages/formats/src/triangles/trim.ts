@@ -9,7 +9,10 @@ import type { Survey } from './survey.js';
 const READ =
   /^(KHR_materials_\w+|EXT_materials_\w+|KHR_lights_punctual|KHR_texture_transform|KHR_mesh_quantization|EXT_mesh_gpu_instancing)$/;
 
-/** The JSON of a glTF with nothing in it but what its scene uses. Names and extras are left out: a name is copied for each channel of an animation. */
+/** Characters of a name that are kept: it is copied for each channel of an animation. */
+const NAME_LENGTH = 64;
+
+/** The JSON of a glTF with nothing in it but what its scene uses. Of names, those of meshes and materials are kept, which picks tell. */
 export function trimmed(document: GltfDocument, survey: Survey): Json {
   const { json } = document;
   const { meshes, materials, skins, accessors } = survey;
@@ -24,9 +27,10 @@ export function trimmed(document: GltfDocument, survey: Survey): Json {
     nodes: list('nodes').map((node, index) => nodeOf(isObject(node) ? node : {}, index, survey)),
     meshes: list('meshes').map((mesh, index) => {
       if (!meshes.has(index)) return { primitives: [] };
-      return { primitives: survey.primitivesOf(index).map(primitiveOf), weights: (mesh as Json).weights };
+      const { name, weights } = mesh as Json;
+      return { name: nameOf(name), primitives: survey.primitivesOf(index).map(primitiveOf), weights };
     }),
-    materials: only('materials', materials, unnamed),
+    materials: only('materials', materials, (material) => ({ ...unnamed(material), name: nameOf(material.name) })),
     textures: list('textures').map((texture, index) =>
       isObject(texture) && hasSource(texture) ? { sampler: texture.sampler, source: sourceOf(document, index) } : {},
     ),
@@ -44,6 +48,9 @@ export function trimmed(document: GltfDocument, survey: Survey): Json {
 }
 
 const unnamed = (item: Json): Json => ({ ...item, name: undefined, extras: undefined });
+
+const nameOf = (name: unknown): string | undefined =>
+  typeof name === 'string' ? name.slice(0, NAME_LENGTH) : undefined;
 
 const hasSource = ({ source, extensions }: Json): boolean =>
   source !== undefined || (isObject(extensions) && isObject(extensions.EXT_texture_webp));

@@ -42,11 +42,12 @@ export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]
   const whole = points.map((): Range => ({ first: 0, end: count }));
   const rows = lookAt(source, points, whole);
   const ranks = LEFT.map((share) => ranksAt(source, points, whole, rows, share));
-  const [near, depth, far] = surfacesOf(source, points, ranks);
+  const [near, middle, far] = surfacesOf(source, points, ranks);
   return rows.map((row, i) => ({
     opacity: 1 - product(row, 0),
     transmittance: product(row, 1),
-    ...{ near: near[i], depth: depth[i], far: far[i] },
+    ...{ near: near[i]?.depth ?? null, depth: middle[i]?.depth ?? null, far: far[i]?.depth ?? null },
+    splat: middle[i] && { placement: undefined, index: middle[i].index },
   }));
 }
 
@@ -75,12 +76,18 @@ function ranksAt(
   return crossings.map((place, i) => (place === null ? null : current[i].first + place.at));
 }
 
-/** Depths at which splats are densest along the rays of the points; one fragment each. */
+/** A splat, and the depth at which it is densest along the ray of a point. */
+interface Surface {
+  readonly depth: number;
+  readonly index: number;
+}
+
+/** The splats of ranks, and their depths along the rays of the points; one fragment each. */
 function surfacesOf(
   { gl, useSurface }: GlProbeSource,
   points: readonly ProbePoint[],
   ranks: readonly (readonly (number | null)[])[],
-): (number | null)[][] {
+): (Surface | null)[][] {
   const width = points.length * ranks.length;
   const words = new Uint32Array(4 * width);
   const numbers = new Float32Array(words.buffer);
@@ -101,7 +108,12 @@ function surfacesOf(
     gl.viewport(0, 0, width, 1);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.readPixels(0, 0, width, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
-    return ranks.map((row, k) => row.map((rank, i) => (rank === null ? null : numbers[4 * (k * points.length + i)])));
+    return ranks.map((row, k) =>
+      row.map((rank, i) => {
+        const at = 4 * (k * points.length + i);
+        return rank === null ? null : { depth: numbers[at], index: words[at + 1] };
+      }),
+    );
   } finally {
     gl.deleteFramebuffer(target);
     gl.deleteTexture(texture);

@@ -36,6 +36,8 @@ export interface BoxOptions {
   readonly alpha?: number;
   /** It moves by so much along x within a second. */
   readonly moves?: number;
+  /** Names of the mesh and its material. */
+  readonly names?: readonly [mesh: string, material: string];
   /** A splat besides, at this place. */
   readonly splat?: readonly [number, number, number];
 }
@@ -47,6 +49,7 @@ export function boxGlb({
   surface = 'shining',
   alpha = 1,
   moves,
+  names: [mesh, wood] = ['', ''],
   splat,
 }: BoxOptions = {}): File {
   const { positions, normals, indices } = box(half);
@@ -88,8 +91,8 @@ export function boxGlb({
     scene: 0,
     scenes: [{ nodes: [0] }],
     nodes: [{ mesh: 0 }],
-    meshes: [{ primitives }],
-    materials: [material(surface, colour, alpha)],
+    meshes: [{ name: mesh, primitives }],
+    materials: [{ name: wood, ...material(surface, colour, alpha) }],
     extensionsUsed: ['KHR_materials_unlit', ...(splat ? ['KHR_gaussian_splatting'] : [])],
     ...(animations.length > 0 && { animations }),
     accessors,

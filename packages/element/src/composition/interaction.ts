@@ -1,0 +1,248 @@
+/** Loaded when a child of an element is `interactive`: who is clicked, and what the pointer is over. */
+import type { Camera } from '@gaussian-splat/core';
+import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
+import { css, type ReactiveControllerHost } from 'lit';
+import { project } from '../camera/projection.js';
+import type { PickedPoint } from '../camera/values.js';
+import { adoptStyles } from '../styles.js';
+import { word, type SpokenStrings } from '../words.js';
+import { SplatChild } from './child.js';
+
+/** What clicks on children need of the element. */
+export interface InteractionHost {
+  readonly element: ReactiveControllerHost & HTMLElement;
+  readonly surface: HTMLElement | null;
+  /** The camera of the last frame. */
+  readonly drawnFrom: Camera | undefined;
+  readonly isOnShow: boolean;
+  readonly strings: SpokenStrings;
+  positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null>;
+}
+
+/** A click or a move of the pointer that meets a child, as the browser's own events meet an element of HTML. */
+export class ScenePointerEvent extends PointerEvent {
+  /** What was met; null for a click by key, and beside everything. */
+  readonly hit: PickedPoint | null;
+
+  constructor(type: string, init: PointerEventInit, hit: PickedPoint | null) {
+    super(type, init);
+    this.hit = hit;
+  }
+}
+
+/** Least time between two looks for what is under a moving pointer, ms; and how many times as long as a look took. */
+const [HOVER_MS, HOVER_SHARE] = [60, 3];
+/** Around what has the keyboard, CSS pixels: bounds are those of the centers of splats. */
+const MARGIN = 12;
+
+const STYLES = css`
+  .children {
+    position: absolute;
+    inset: 0;
+    overflow: hidden;
+    pointer-events: none;
+  }
+  [part='scene-button'] {
+    position: absolute;
+    padding: 0;
+    border: 0;
+    background: none;
+    pointer-events: none;
+  }
+  [part='scene-button']:focus-visible {
+    outline: 2px solid var(--scene-focus-color, highlight);
+    outline-offset: 2px;
+    box-shadow: 0 0 0 2px rgb(255 255 255 / 0.8);
+  }
+`;
+
+/**
+ * Gives children the clicks and moves of the pointer that meet them. A click on the image is held back until the GPU has said what lies there, and then comes once, to the
+ * child or to the element itself. For keys there is a button for each child, which pointers pass by.
+ */
+export class Interaction {
+  readonly #of: InteractionHost;
+  readonly #layer: HTMLElement;
+  readonly #buttons = new Map<SplatChild, HTMLButtonElement>();
+  #surface: HTMLElement | undefined;
+  #over: SplatChild | null = null;
+  /** The latest move of the pointer that was not looked at yet. */
+  #moved: PointerEvent | undefined;
+  #isLooking = false;
+
+  constructor(of: InteractionHost) {
+    this.#of = of;
+    const { element } = of;
+    adoptStyles(element.shadowRoot!, STYLES);
+    this.#layer = element.ownerDocument.createElement('div');
+    this.#layer.className = 'children';
+    new MutationObserver(() => this.update()).observe(element, {
+      ...{ childList: true, subtree: true },
+      attributeFilter: ['aria-label', 'title', 'lang'],
+    });
+    element.addEventListener('camera-change', () => this.#placeFocused());
+    // Those of children do not bubble.
+    element.addEventListener('load', () => this.update(), { capture: true });
+    element.addController({ hostUpdated: () => this.update() });
+    this.update();
+  }
+
+  get #children(): SplatChild[] {
+    return [...this.#of.element.children].filter(
+      (child): child is SplatChild => child instanceof SplatChild && child.interactive && !child.hidden,
+    );
+  }
+
+  /** Children or their attributes have changed. */
+  update(): void {
+    const { surface } = this.#of;
+    if (surface === null) return;
+    if (surface !== this.#surface) this.#listen(surface);
+    const children = this.#children;
+    for (const [child, button] of this.#buttons) {
+      if (children.includes(child)) continue;
+      button.remove();
+      this.#buttons.delete(child);
+      if (child === this.#over) this.#setOver(null, undefined, null);
+    }
+    children.forEach((child, i) => {
+      const button = this.#buttonOf(child);
+      button.hidden = !this.#of.isOnShow || !child.loaded;
+      button.ariaLabel = child.ariaLabel || child.title || word(this.#of.strings, 'scene');
+      button.lang = child.lang;
+      if (this.#layer.children[i] !== button) this.#layer.insertBefore(button, this.#layer.children[i] ?? null);
+    });
+  }
+
+  #listen(surface: HTMLElement): void {
+    this.#surface = surface;
+    surface.after(this.#layer);
+    // What drags, measures or walks has stopped its clicks in the capturing phase.
+    surface.addEventListener('click', (event) => void this.#onClick(event));
+    surface.addEventListener('pointermove', (event) => this.#onMove(event));
+    surface.addEventListener('pointerleave', (event) => {
+      this.#moved = undefined;
+      this.#setOver(null, event, null);
+    });
+  }
+
+  #buttonOf(child: SplatChild): HTMLButtonElement {
+    const known = this.#buttons.get(child);
+    if (known) return known;
+    const button = Object.assign(this.#of.element.ownerDocument.createElement('button'), { type: 'button' });
+    button.setAttribute('part', 'scene-button');
+    button.addEventListener('click', (event) => {
+      event.stopPropagation();
+      child.dispatchEvent(new ScenePointerEvent('click', { ...BUBBLES, detail: event.detail }, null));
+    });
+    for (const [type, also] of [
+      ['focus', 'focusin'],
+      ['blur', 'focusout'],
+    ]) {
+      button.addEventListener(type, () => {
+        this.#place(child, button);
+        child.dispatchEvent(new FocusEvent(type));
+        child.dispatchEvent(new FocusEvent(also, { bubbles: true }));
+      });
+    }
+    this.#buttons.set(child, button);
+    return button;
+  }
+
+  async #onClick(event: MouseEvent): Promise<void> {
+    if (this.#children.length === 0) return;
+    event.stopImmediatePropagation();
+    event.preventDefault();
+    const hit = await this.#look(event);
+    const target = this.#childOf(hit) ?? this.#of.element;
+    target.dispatchEvent(new ScenePointerEvent('click', initOf(event), hit));
+  }
+
+  #onMove(event: PointerEvent): void {
+    // A finger hovers over nothing, and who drags looks at something else.
+    if (event.pointerType === 'touch' || event.buttons !== 0 || this.#children.length === 0) return;
+    this.#moved = event;
+    if (!this.#isLooking) void this.#follow();
+  }
+
+  /** Looks for what is under the pointer as long as it moves: no oftener than the GPU can answer at leisure. */
+  async #follow(): Promise<void> {
+    this.#isLooking = true;
+    while (this.#moved) {
+      const event = this.#moved;
+      this.#moved = undefined;
+      const begin = performance.now();
+      const hit = await this.#look(event);
+      // A pointer that has left meanwhile is over nothing.
+      if (this.#surface?.matches(':hover') !== false) this.#setOver(this.#childOf(hit), event, hit);
+      const took = performance.now() - begin;
+      await new Promise((resolve) => setTimeout(resolve, Math.max(HOVER_MS, HOVER_SHARE * took)));
+    }
+    this.#isLooking = false;
+  }
+
+  /** A device that is lost answers nothing. */
+  #look({ clientX, clientY }: MouseEvent): Promise<PickedPoint | null> {
+    return this.#of.positionFromPoint(clientX, clientY).catch(() => null);
+  }
+
+  #childOf(hit: PickedPoint | null): SplatChild | null {
+    return this.#children.find((child) => child === hit?.element) ?? null;
+  }
+
+  #setOver(child: SplatChild | null, event: PointerEvent | undefined, hit: PickedPoint | null): void {
+    const before = this.#over;
+    if (child === before) return;
+    this.#over = child;
+    if (this.#surface) this.#surface.style.cursor = child ? child.style.cursor || 'pointer' : '';
+    const tell = (target: SplatChild | null, types: readonly [string, string], relatedTarget: Element): void => {
+      const init = { ...(event ? initOf(event) : BUBBLES), relatedTarget, cancelable: false };
+      types.forEach((type, i) =>
+        target?.dispatchEvent(new ScenePointerEvent(type, { ...init, bubbles: i === 0 }, hit)),
+      );
+    };
+    tell(before, ['pointerout', 'pointerleave'], child ?? this.#of.element);
+    tell(child, ['pointerover', 'pointerenter'], before ?? this.#of.element);
+  }
+
+  #placeFocused(): void {
+    for (const [child, button] of this.#buttons) if (button.matches(':focus')) this.#place(child, button);
+  }
+
+  /** Puts the button of a child around it, so that the outline shows who has the keyboard. */
+  #place(child: SplatChild, button: HTMLButtonElement): void {
+    const { drawnFrom: camera, surface } = this.#of;
+    const placement = child.holder.member?.placement;
+    const bounds = placement && boundsOfWorld({ placements: [placement] });
+    if (!camera || !bounds || !surface) return;
+    const corners = Array.from({ length: 8 }, (_, k) => {
+      const side = (axis: number): number => (k & (1 << axis) ? bounds.max : bounds.min)[axis];
+      return project(camera, [side(0), side(1), side(2)]);
+    });
+    // The eye is within it: it is all around.
+    const isAround = corners.some(({ depth }) => depth <= 0);
+    const range = (of: 'x' | 'y', size: number): [number, number] => {
+      const share = (value: number): number => Math.min(1, Math.max(0, value / size));
+      const all = corners.map((corner) => corner[of]);
+      return isAround ? [0, 1] : [share(Math.min(...all)), share(Math.max(...all))];
+    };
+    const [left, right] = range('x', camera.width);
+    const [top, bottom] = range('y', camera.height);
+    const length = (share: number, px: number): string => `calc(${(100 * share).toFixed(2)}% + ${px}px)`;
+    const box = { left: length(left, -MARGIN), top: length(top, -MARGIN) };
+    Object.assign(box, { width: length(right - left, 2 * MARGIN), height: length(bottom - top, 2 * MARGIN) });
+    Object.assign(button.style, box);
+  }
+}
+
+const BUBBLES = { bubbles: true, composed: true, cancelable: true } as const;
+
+/** What an event says of the pointer and of keys. */
+function initOf(event: MouseEvent): PointerEventInit {
+  const { clientX, clientY, screenX, screenY, button, buttons, detail, view } = event;
+  const { ctrlKey, shiftKey, altKey, metaKey } = event;
+  const { pointerId, pointerType, isPrimary } = event as PointerEvent;
+  const pointer = pointerType === undefined ? {} : { pointerId, pointerType, isPrimary };
+  const place = { clientX, clientY, screenX, screenY, button, buttons, detail, view };
+  return { ...BUBBLES, ...place, ctrlKey, shiftKey, altKey, metaKey, ...pointer };
+}

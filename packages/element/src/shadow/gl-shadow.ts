@@ -1,0 +1,41 @@
+/** The shadow of a scene that WebGL draws: beneath it, in the same context. */
+import { multiply, type Camera } from '@gaussian-splat/core';
+import { DATA_WIDTH, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
+import type { GlPainter } from '../webgl/gl-painter.js';
+import type { Taker } from './shadow-controller.js';
+import { alphaOfScene } from './take-alpha-gl.js';
+
+const upTo = (count: number): Uint32Array => Uint32Array.from({ length: count }, (_, i) => i);
+
+/** Takes images of a painter's scene, and draws shadows beneath it. */
+export function glTaker(painter: GlPainter): Taker {
+  const { lease, textures } = painter.scene;
+  const { gl } = lease;
+  const own = new GlRenderer(gl, textures);
+  const { take, free } = alphaOfScene(gl, own, upTo(textures.facts.count));
+  const show: Taker['show'] = async (packed, map, toWorld) => {
+    const gaussians = await GlGaussians.upload(gl, packed);
+    const renderer = new GlRenderer(gl, gaussians);
+    // All lie in one plane: any order shows the same.
+    renderer.setOrder(upTo(DATA_WIDTH * Math.max(1, Math.ceil(packed.count / DATA_WIDTH))), packed.count);
+    let isSeen = true;
+    const beneath = (camera: Camera): void => {
+      if (!isSeen) return;
+      const placed = { ...camera, worldToCamera: multiply(camera.worldToCamera, toWorld) };
+      renderer.render({ camera: placed, shDegree: 0, accumulation: 'rgba16float', resolutionScale: 1 });
+      renderer.present(undefined, { keeps: true });
+    };
+    painter.beneath = beneath;
+    const remove = (): void => {
+      if (painter.beneath === beneath) painter.beneath = undefined;
+      renderer.destroy();
+      gaussians.destroy();
+    };
+    return { context: gl, map, toWorld, fade: (opacity) => void (isSeen = opacity > 0.5), remove };
+  };
+  const end = (): void => {
+    free();
+    own.destroy();
+  };
+  return { take, show, free: end };
+}

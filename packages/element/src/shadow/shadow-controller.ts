@@ -1,0 +1,216 @@
+/** Loaded where an element has the attribute `shadow-intensity`: the shadow under what it shows. */
+import { eyeOf, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
+import { GaussianBuffers, type FrameTarget, type Placement, type World } from '@gaussian-splat/renderer';
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import type { Attributes } from '../attributes.js';
+import { numberGrammar, readAttribute } from '../camera/grammar.js';
+import { toViewer, type ViewerFrame } from '../camera/orbit.js';
+import type { SceneBounds } from '../camera/settings.js';
+import { matrixOfFrame, transposed } from '../composition/placing.js';
+import type { Mover } from '../controllers/motion.js';
+import type { Painter, Place } from '../gpu/painter.js';
+import type { Viewport } from '../gpu/viewport.js';
+import type { Frame } from '../live/frame-filter.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+import type { Member } from '../member.js';
+import { shadowSplats, takeShadow, type ShadowMap, type TakeAlpha } from './shadow-map.js';
+import { packSplats } from './splat-file.js';
+
+/** What the shadow asks of its element. */
+export interface ShadowHost {
+  readonly element: ReactiveControllerHost & HTMLElement;
+  readonly attributes: Pick<Attributes, 'shadowIntensity' | 'shadowSoftness'>;
+  readonly services: { readonly sceneLoader: SceneLoader };
+  readonly frame: ViewerFrame;
+  readonly camera: { view(width: number, height: number): Camera };
+  readonly behaviours: { add(mover: Mover): void };
+  readonly isImmersed: boolean;
+  readonly view: { readonly painter: Painter | null };
+  readonly sources: {
+    readonly world: World;
+    readonly members: readonly Member[];
+    readonly isPreview: boolean;
+    readonly bounds: SceneBounds | null;
+    readonly meshes: { readonly value: { readonly version: string } | undefined };
+  };
+  drawBeneath(frame: Frame): Partial<FrameTarget>;
+  requestFrame(): void;
+  warn(sentence: string): void;
+}
+
+/** A shadow of what moves is made anew no oftener than this, ms, nor than a tenth of the time. */
+const [LEAST_MS, SHARE] = [500, 10];
+/** The shadow fades while the eye goes from so far above the ground, in radii, to the ground: from below nobody sees it. */
+const FADE = 0.08;
+
+/** How dark and how soft: `shadow-intensity` and `shadow-softness`. */
+export function readShadow({ attributes, warn }: Pick<ShadowHost, 'attributes' | 'warn'>): {
+  readonly intensity: number;
+  readonly softness: number;
+} {
+  const of = (name: string, value: number | string | null, fallback: number): number =>
+    readAttribute(name, value, numberGrammar(fallback, 0, 'a number from 0 to 1', 1), warn);
+  const { shadowIntensity, shadowSoftness } = attributes;
+  return {
+    intensity: of('shadow-intensity', shadowIntensity, 0),
+    softness: of('shadow-softness', shadowSoftness, 1),
+  };
+}
+
+/** A shadow in the world of an element. */
+interface Shown {
+  readonly context: Place['context'];
+  readonly map: ShadowMap;
+  /** From its own square to the world. */
+  readonly toWorld: Matrix4;
+  /** 0..1: what of it the camera sees. */
+  fade(opacity: number): void;
+  remove(): void;
+}
+
+/** Takes images of what is shown when that has changed, makes flat splats of them, and puts these under it. */
+export class ShadowController implements ReactiveController, Mover {
+  readonly #stage: ShadowHost;
+  /** What the shadow is of. */
+  #key = '';
+  #shown: Shown | undefined;
+  #isBusy = false;
+  #notBefore = -Infinity;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(stage: ShadowHost) {
+    this.#stage = stage;
+    stage.element.addController(this);
+    stage.behaviours.add(this);
+  }
+
+  hostUpdated(): void {
+    this.#stage.requestFrame();
+  }
+
+  hostDisconnected(): void {
+    clearTimeout(this.#timer);
+  }
+
+  advance(now: number): boolean {
+    const { view, isImmersed } = this.#stage;
+    const { painter } = view;
+    if (this.#shown && this.#shown.context !== painter?.place.context) this.#remove();
+    if (!painter || painter.isLost || isImmersed) return false;
+    const key = this.#contentKey();
+    if (key === '') this.#remove();
+    else if (key !== this.#key && !this.#isBusy) this.#renew(painter, key, now);
+    this.#fade();
+    return false;
+  }
+
+  /** Changes whenever the shadow would; empty for none. */
+  #contentKey(): string {
+    const { sources } = this.#stage;
+    const { intensity, softness } = readShadow(this.#stage);
+    if (intensity === 0 || sources.members.length === 0 || sources.isPreview) return '';
+    const places = sources.members.map(({ placement: { scene, sceneToWorld, visible, crop, opacity } }) => {
+      const place = sceneToWorld ? Array.from(sceneToWorld).join() : '';
+      return `${scene.count} ${scene.version} ${place} ${visible} ${crop ? [crop.min, crop.max].join() : ''} ${opacity}`;
+    });
+    return [...places, sources.meshes.value?.version, intensity, softness].join('|');
+  }
+
+  #renew(painter: Painter, key: string, now: number): void {
+    if (now < this.#notBefore) {
+      // What has ended its motion has a shadow of its last pose.
+      this.#timer ??= setTimeout(() => {
+        this.#timer = undefined;
+        this.#stage.requestFrame();
+      }, this.#notBefore - now);
+      return;
+    }
+    this.#isBusy = true;
+    this.#key = key;
+    const begin = performance.now();
+    this.#make(painter)
+      .catch((error: Error) => {
+        if (!painter.isLost && !painter.isDestroyed) this.#stage.warn(`<gaussian-splat> shadow: ${error.message}`);
+      })
+      .finally(() => {
+        this.#isBusy = false;
+        this.#notBefore = performance.now() + Math.max(LEAST_MS, SHARE * (performance.now() - begin));
+        this.#stage.requestFrame();
+      });
+  }
+
+  async #make(painter: Painter): Promise<void> {
+    const { sources, frame, services } = this.#stage;
+    const { bounds } = sources;
+    const [scene] = sources.members.map((member) => member.scene);
+    if (!bounds || !scene) return;
+    const { center, radius } = bounds.subject ?? bounds;
+    const { intensity, softness } = readShadow(this.#stage);
+    const taker = await this.#taker(painter);
+    try {
+      const map = await takeShadow({ center: toViewer(frame, center), radius, frame }, taker.take);
+      if (map === null || painter.isLost || painter.isDestroyed) return this.#remove();
+      const rows = shadowSplats(map, intensity, softness);
+      if (rows.length === 0) return this.#remove();
+      const packed = await packSplats(rows, services.sceneLoader, scene.signal);
+      const shown = await taker.show(packed, map, worldOf(map, frame));
+      this.#shown?.remove();
+      this.#shown = shown;
+    } finally {
+      taker.free();
+    }
+  }
+
+  /** Takes images, and shows shadows, with what the painter draws with. */
+  async #taker(painter: Painter): Promise<Taker> {
+    if (painter.place.context instanceof WebGL2RenderingContext) {
+      const { glTaker } = await import('./gl-shadow.js');
+      return glTaker(painter as Parameters<typeof glTaker>[0]);
+    }
+    const { alphaOfWorld } = await import('./take-alpha.js');
+    const { sources } = this.#stage;
+    const { device, view } = painter as Viewport;
+    const { take, free } = alphaOfWorld({
+      ...{ device, members: sources.members, settings: view.settings, filter: view.filter },
+      drawBeneath: (camera) => this.#stage.drawBeneath({ camera } as Frame),
+    });
+    const show: Taker['show'] = async (packed, map, toWorld) => {
+      const gaussians = await GaussianBuffers.upload(device, packed);
+      const placement: Placement = sources.world.add({ scene: gaussians, sceneToWorld: toWorld });
+      const remove = (): void => {
+        sources.world.remove(placement);
+        gaussians.destroy();
+      };
+      const fade = (opacity: number): void => void (placement.opacity = opacity);
+      return { context: device, map, toWorld, fade, remove };
+    };
+    return { take, free, show };
+  }
+
+  #fade(): void {
+    if (!this.#shown) return;
+    const { map } = this.#shown;
+    const { frame, camera } = this.#stage;
+    const [, height] = toViewer(frame, eyeOf(camera.view(1, 1).worldToCamera));
+    this.#shown.fade(Math.min(1, Math.max(0, (height - map.middle[1]) / (FADE * map.half))));
+  }
+
+  #remove(): void {
+    this.#key = '';
+    this.#shown?.remove();
+    this.#shown = undefined;
+  }
+}
+
+/** Where images are taken, and shadows shown. */
+export interface Taker {
+  readonly take: TakeAlpha;
+  show(packed: Parameters<typeof GaussianBuffers.upload>[1], map: ShadowMap, toWorld: Matrix4): Promise<Shown>;
+  free(): void;
+}
+
+/** From the square of a shadow to the world. */
+function worldOf({ middle: [x, y, z], half }: ShadowMap, frame: ViewerFrame): Matrix4 {
+  const placed = [half, 0, 0, x, 0, half, 0, y, 0, 0, half, z, 0, 0, 0, 1];
+  return multiply(transposed(matrixOfFrame(frame)), placed);
+}

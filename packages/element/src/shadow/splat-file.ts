@@ -1,0 +1,33 @@
+import type { Vector3 } from '@gaussian-splat/core';
+import type { SceneLoader } from '../loading/scene-loader.js';
+import type { LoadedScene } from '../loading/protocol.js';
+
+/** Bytes of a splat in a `.splat` file: position and scale as float32, color and opacity, rotation. */
+const ROW_BYTES = 32;
+
+/** A splat that is not turned: its center, its standard deviations, and red, green, blue and opacity of 255. */
+export type SplatRow = readonly [place: Vector3, scale: Vector3, color: readonly [number, number, number, number]];
+
+/** Splats of the element's own as a `.splat` file, with their axes as given. */
+export function splatFile(rows: readonly SplatRow[]): ArrayBuffer {
+  const view = new DataView(new ArrayBuffer(ROW_BYTES * rows.length));
+  rows.forEach(([place, scale, color], i) => {
+    const at = ROW_BYTES * i;
+    [...place, ...scale].forEach((value, k) => view.setFloat32(at + 4 * k, value, true));
+    // No rotation: 1, 0, 0, 0.
+    [...color, 255, 128, 128, 128].forEach((value, k) => view.setUint8(at + 24 + k, value));
+  });
+  return view.buffer;
+}
+
+/** Packs such splats as those of any scene. */
+export async function packSplats(
+  rows: readonly SplatRow[],
+  loader: SceneLoader,
+  signal: AbortSignal,
+): Promise<LoadedScene['packed']> {
+  const url = URL.createObjectURL(new Blob([splatFile(rows)]));
+  const request = { url: `${url}#own.splat`, credentials: 'same-origin', sh: 'auto', levels: false } as const;
+  const { packed } = await loader.load(request, signal, () => undefined).finally(() => URL.revokeObjectURL(url));
+  return packed;
+}

@@ -1,0 +1,47 @@
+/** Opacity of all that a painter draws with WebGPU, in small images. Reads back: never for a frame. */
+import type { Camera, SplatFilter } from '@gaussian-splat/core';
+import {
+  capture,
+  Viewpoint,
+  World,
+  type FrameSettings,
+  type FrameTarget,
+  type GaussianScene,
+} from '@gaussian-splat/renderer';
+import type { Member } from '../member.js';
+import { SHADOW_PIXELS, type TakeAlpha } from './shadow-map.js';
+
+export interface AlphaSource {
+  readonly device: GPUDevice;
+  readonly members: readonly Member[];
+  readonly settings: FrameSettings;
+  readonly filter: SplatFilter | undefined;
+  /** Draws what is no splats. */
+  drawBeneath(camera: Camera): Partial<FrameTarget>;
+}
+
+/** Free it when all images are taken. */
+export function alphaOfWorld({ device, members, settings, filter, drawBeneath }: AlphaSource): {
+  readonly take: TakeAlpha;
+  free(): void;
+} {
+  const world = new World();
+  for (const { placement } of members) {
+    const { scene, sceneToWorld, opacity, crop, visible } = placement;
+    world.add({ scene: asItIs(scene), sceneToWorld, opacity, crop, visible });
+  }
+  const viewpoint = new Viewpoint(device, world, { settings: { ...settings, shDegree: 0 } });
+  return {
+    take: async (camera) => {
+      const pixels = await capture(device, viewpoint, { camera, filter, ...drawBeneath(camera) });
+      return Float32Array.from({ length: SHADOW_PIXELS ** 2 }, (_, i) => pixels[4 * i + 3]);
+    },
+    free: () => viewpoint.destroy(),
+  };
+}
+
+/** A scene with what it holds now: a view from above asks for no pages of a streamed one. */
+const asItIs = (scene: GaussianScene): GaussianScene => {
+  const { count, shDegree, shPrecision, antialiased, filterVariance, origin, pages, version } = scene;
+  return { count, shDegree, shPrecision, antialiased, filterVariance, origin, pages, version };
+};
