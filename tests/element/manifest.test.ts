@@ -112,7 +112,7 @@ check('names the slots, parts, custom properties and states that there are', () 
     .join('\n');
   const [template, styles] = [source('template.ts') + late, source('styles.ts') + late];
   const slots = matches(template, /<slot name="([a-z-]+)"/g);
-  assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*']));
+  assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*', 'sound']));
   const panelParts = matches(source('live/controls-panel.ts'), /part: '([a-z-]+)'/g);
   assert.ok(panelParts.length > 0);
   const parts = [/part="([a-z-]+)"/g, /[bB]utton\(\s*'([a-z-]+)'/g].flatMap((pattern) => matches(template, pattern));
