@@ -107,7 +107,13 @@ check('names the events of the typed map, with their types, and every one that t
 
 check('names the slots, parts, custom properties and states that there are', () => {
   // What few pages need is in chunks of their own.
-  const late = ['views/tour', 'hands-view', 'controllers/motion-controller', 'controllers/hotspot-controller']
+  const late = [
+    'views/tour',
+    'hands-view',
+    'live/sound',
+    'controllers/motion-controller',
+    'controllers/hotspot-controller',
+  ]
     .map((name) => source(`${name}.ts`))
     .join('\n');
   const [template, styles] = [source('template.ts') + late, source('styles.ts') + late];
@@ -115,7 +121,9 @@ check('names the slots, parts, custom properties and states that there are', () 
   assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*', 'sound']));
   const panelParts = matches(source('live/controls-panel.ts'), /part: '([a-z-]+)'/g);
   assert.ok(panelParts.length > 0);
-  const parts = [/part="([a-z-]+)"/g, /[bB]utton\(\s*'([a-z-]+)'/g].flatMap((pattern) => matches(template, pattern));
+  const parts = [/part="([a-z-]+)"/g, /'part', '([a-z-]+)'/g, /[bB]utton\(\s*'([a-z-]+)'/g].flatMap((pattern) =>
+    matches(template, pattern),
+  );
   assert.deepEqual(namesOf(element?.cssParts), unique([...parts, ...panelParts]));
   assert.deepEqual(namesOf(element?.cssProperties), matches(styles, /var\((--[a-z-]+)/g));
   const [, states] = /const STATES = \[([^\]]+)\]/.exec(source('element.ts')) ?? [];
