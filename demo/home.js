@@ -10,6 +10,29 @@ const status = byId('own-status');
 
 bringTabsToLife(document.querySelector('.tabs'));
 
+hero.addEventListener('camera-change', ({ detail }) => {
+  // The copied view is the one that the visitor chose.
+  if (detail.source === 'user-interaction') hero.autoRotate = false;
+});
+
+byId('copy-page').addEventListener('click', async () => {
+  const address = (path) => new URL(path, document.baseURI).href;
+  const view = Object.entries(viewOf(hero)).map(([name, value]) => `  ${name}="${value}"`);
+  const html = `<!doctype html>
+<html lang="en">
+<meta charset="utf-8" />
+<meta name="viewport" content="width=device-width, initial-scale=1" />
+<title>A skull</title>
+<script type="module" src="${address('cdn/gaussian-splat.min.js')}"></script>
+<gaussian-splat src="${address('scenes/skull.spz')}" alt="A skull" camera-controls auto-rotate
+${view.join('\n')}
+  style="display: block; width: 100%; height: 90vh"></gaussian-splat>
+</html>
+`;
+  byId('snippet').textContent = html;
+  byId('copied').textContent = await copy(html);
+});
+
 byId('copy-view').addEventListener('click', async () => {
   const view = Object.entries(viewOf(hero)).map(([name, value]) => `  ${name}="${value}"`);
   const size = '  style="width: 100%; height: auto; aspect-ratio: 4 / 3"';

@@ -1,6 +1,6 @@
 /**
- * `npm run lint:words [-- --longest 20]`, a part of `npm run lint`: what is written for readers keeps to the project's words (scripts/words/terms.mjs), and README and guides to short sentences. Read are documents, pages of the
- * site, comments of the public API, the tables of attributes, and sentences of errors and of scripts. `--longest` prints the longest sentences of README and guides.
+ * `npm run lint:words [-- --longest 20] [--inside]`, a part of `npm run lint`: texts for readers use the project's terms (scripts/words/terms.mjs), and README and guides sentences of a readable length. It reads documents, pages of the
+ * site, comments of the public API, the tables of attributes, and sentences of errors and of scripts. `--longest` prints the longest sentences of README and guides, `--inside` counts words in all comments and strings.
  */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -8,20 +8,30 @@ import { parseArgs } from 'node:util';
 import { root } from './lib/run.mjs';
 import { blocksOfMarkdown, blocksOfPage, sentencesOf, wordsOf } from './words/prose.mjs';
 import { attributeComments, publicComments, sentencesInCode } from './words/sources.mjs';
-import { retiredIn } from './words/terms.mjs';
+import { RATES, retiredIn } from './words/terms.mjs';
 
-/** Words a sentence: on average, most, and the share above `many`. */
+/** Words of a sentence outside tables: bounds of the average, the longest, and the fractions above `many` and of at most `FEW` words. */
 const LIMITS = {
-  README: { files: (path) => path === 'README.md', average: 16, longest: 35 },
-  guides: { files: (path) => path.startsWith('docs/guide/'), average: 17, many: 30, share: 0.03 },
+  README: { files: (path) => path === 'README.md', least: 11, average: 16, longest: 35, short: 0.3 },
+  guides: {
+    files: (path) => path.startsWith('docs/guide/'),
+    least: 11,
+    average: 16,
+    many: 30,
+    share: 0.03,
+    short: 0.32,
+  },
 };
-/** Written by a command, from the headers of tests. */
-const GENERATED = ['docs/stability.md'];
+const FEW = 7;
+/** Upper limits per 1,000 words of documents and pages. */
+const RATE_LIMITS = { where: 1.5, 'what-clauses': 1.5, 'of which': 0.5 };
 /** Reasons and records, for those who work on the project. */
 const RECORDS = /^docs\/decisions\//;
 const NOT_OURS = /(^|\/)(node_modules|dist|cdn|generated|\.[^/]+)$/;
 
-const { values } = parseArgs({ options: { longest: { type: 'string', default: '0' } } });
+const { values } = parseArgs({
+  options: { longest: { type: 'string', default: '0' }, inside: { type: 'boolean', default: false } },
+});
 const documents = [
   'README.md',
   'CONTRIBUTING.md',
@@ -29,17 +39,20 @@ const documents = [
   'CHANGELOG.md',
   ...filesIn('docs', '.md'),
   ...filesIn('packages', '.md'),
-].filter((path) => !GENERATED.includes(path) && !RECORDS.test(path));
+].filter((path) => !RECORDS.test(path));
 const read = (path) => readFileSync(join(root, path), 'utf8');
 const placed = (path, blocks) => blocks.map((block) => ({ file: path, ...block }));
 const prose = new Map(documents.map((path) => [path, blocksOfMarkdown(read(path))]));
 
-const texts = [
+const documentsAndPages = [
   ...[...prose].flatMap(([path, blocks]) => placed(path, blocks)),
   ...filesIn('demo', '.md').flatMap((path) => placed(path, blocksOfMarkdown(read(path)))),
   ...[...filesIn('demo', '.njk'), ...filesIn('demo', '.html'), ...filesIn('benchmarks', '.html')].flatMap((path) =>
     placed(path, blocksOfPage(read(path))),
   ),
+].map((block) => ({ ...block, isDocument: true }));
+const texts = [
+  ...documentsAndPages,
   ...[
     ...filesIn('demo', '.js'),
     ...filesIn('benchmarks', '.js'),
@@ -52,8 +65,8 @@ const texts = [
 
 let faults = 0;
 const seen = new Set();
-for (const { file, line, text } of texts) {
-  for (const { found, instead, at } of retiredIn(text)) {
+for (const { file, line, text, isDocument, isHeading } of texts) {
+  for (const { found, instead, at } of retiredIn(text, { isDocument, isHeading })) {
     const fault = `${file}:${line + text.slice(0, at).split('\n').length - 1}: "${found}". Write: ${instead}.`;
     if (seen.has(fault)) continue;
     seen.add(fault);
@@ -62,28 +75,31 @@ for (const { file, line, text } of texts) {
   }
 }
 for (const [name, limit] of Object.entries(LIMITS)) faults += measure(name, limit);
-if (faults > 0) console.error(`\n${faults} to mend. The words: scripts/words/terms.mjs.`);
+faults += measureRates('documents', documentsAndPages, RATE_LIMITS);
+if (values.inside) countInside();
+if (faults > 0) console.error(`\n${faults} to fix. The words: scripts/words/terms.mjs.`);
 process.exit(faults > 0 ? 1 : 0);
 
 /** Holds the sentences of some documents against their limits. @returns {number} of limits that are not kept */
-function measure(name, { files, average, longest = Infinity, many = 30, share = 1 }) {
+function measure(name, { files, least, average, longest = Infinity, many = 30, share = 1, short }) {
   const sentences = [...prose]
     .filter(([path]) => files(path))
     .flatMap(([path, blocks]) =>
       blocks
-        .filter(({ isHeading }) => !isHeading)
+        .filter(({ isHeading, isCell }) => !isHeading && !isCell)
         .flatMap(({ line, text }) =>
           sentencesOf(text).map((sentence) => ({ path, line, sentence, words: wordsOf(sentence) })),
         ),
     )
-    // A name or a number in a cell is no sentence.
+    // A label is no sentence.
     .filter(({ words }) => words >= 4)
     .sort((a, b) => b.words - a.words);
   const total = sentences.reduce((sum, { words }) => sum + words, 0);
   const mean = total / sentences.length;
+  const few = sentences.filter(({ words }) => words <= FEW).length / sentences.length;
   const above = sentences.filter(({ words }) => words > many).length / sentences.length;
   console.log(
-    `${name}: ${sentences.length} sentences of ${mean.toFixed(1)} words, the longest of ${sentences[0].words}, ${(100 * above).toFixed(1)} % above ${many}`,
+    `${name}: ${sentences.length} sentences of ${mean.toFixed(1)} words, the longest of ${sentences[0].words}, ${(100 * above).toFixed(1)} % above ${many}, ${(100 * few).toFixed(0)} % of ${FEW} or fewer`,
   );
   for (const { path, line, words, sentence } of sentences.slice(0, Number(values.longest)))
     console.log(`  ${words} ${path}:${line}: ${sentence}`);
@@ -91,10 +107,69 @@ function measure(name, { files, average, longest = Infinity, many = 30, share = 
     mean > average && `expected ${average} words a sentence or fewer on average`,
     sentences[0].words > longest &&
       `expected no sentence above ${longest} words, found ${sentences[0].words} in line ${sentences[0].line}`,
+    mean < least && `expected ${least} words a sentence or more on average`,
+    few > short && `expected ${100 * short} % of the sentences with ${FEW} words or fewer, at most`,
     above > share && `expected ${100 * share} % of the sentences above ${many} words or fewer`,
   ].filter(Boolean);
   for (const sentence of broken) console.error(`${name}: ${sentence}. See -- --longest 20.`);
   return broken.length;
+}
+
+/** Rates of words per 1,000 words of some blocks. @returns {number} of limits that are exceeded */
+function measureRates(name, blocks, limits = {}) {
+  const total = blocks.reduce((sum, { text }) => sum + wordsOf(text), 0);
+  const rates = Object.entries(RATES).map(([word, pattern]) => [
+    word,
+    (1000 * blocks.reduce((sum, { text }) => sum + (text.match(pattern)?.length ?? 0), 0)) / total,
+  ]);
+  console.log(`${name}: per 1,000 words ${rates.map(([word, rate]) => `${word} ${rate.toFixed(2)}`).join(', ')}`);
+  const broken = rates.filter(([word, rate]) => rate > limits[word]);
+  for (const [word, rate] of broken)
+    console.error(
+      `${name}: expected "${word}" ${limits[word]} times per 1,000 words at most, found ${rate.toFixed(2)}`,
+    );
+  return broken.length;
+}
+
+/** Comments and strings of code: retired words and rates, without limits. */
+function countInside() {
+  const sources = ['packages', 'tests', 'scripts', 'demo', 'shaders'].flatMap((folder) =>
+    ['.ts', '.tsx', '.mjs', '.js', '.wgsl', '.py'].flatMap((ending) => filesIn(folder, ending)),
+  );
+  for (const [name, chosen] of Object.entries({
+    'comments of packages and shaders': (path) => /^(packages\/[^/]+\/src|shaders)\//.test(path),
+    'comments of tests, scripts and pages': (path) => /^(tests|scripts|demo)\//.test(path),
+  })) {
+    const comments = sources
+      .filter((path) => chosen(path) && !/generated|\.d\.ts$/.test(path))
+      .flatMap((path) => commentsIn(read(path), path).map((text) => ({ text })));
+    measureRates(name, comments);
+    const hits = comments.flatMap(({ text }) => retiredIn(text, { isDocument: true }));
+    const fragments = comments.filter(({ text }) => /^(What|Of|Where|With|By|That|Those)\b/.test(text)).length;
+    console.log(
+      `  ${comments.length} comments, ${hits.length} retired words, ${fragments} fragments that begin with a function word`,
+    );
+  }
+  const strings = filesIn('packages', '.ts')
+    .filter((path) => path.includes('/src/') && !path.includes('generated'))
+    .flatMap((path) => sentencesInCode(join(root, path)));
+  measureRates('strings of packages', strings);
+  console.log(`  ${strings.flatMap(({ text }) => retiredIn(text, { isDocument: true })).length} retired words`);
+}
+
+/** Comments of three words or more, one text each; lines that follow each other are one comment. */
+function commentsIn(source, path) {
+  const pattern = path.endsWith('.py')
+    ? /(?:^[ \t]*#[^\n]*\n)+|"""[\s\S]*?"""/gm
+    : /\/\*[\s\S]*?\*\/|(?:^[ \t]*\/\/[^\n]*\n?)+|(?<=[;,{}()\]] )\/\/[^\n]*/gm;
+  return [...source.matchAll(pattern)]
+    .map(([text]) =>
+      text
+        .replace(/^[ \t]*(\/\*\*?|\*\/|\*|\/\/|#|""")|\*\/$|"""$/gm, '')
+        .replace(/`[^`]*`/g, '`')
+        .trim(),
+    )
+    .filter((text) => wordsOf(text) >= 3 && !/^(eslint|@ts|prettier)/.test(text));
 }
 
 function filesIn(folder, ending) {

@@ -9,7 +9,18 @@ const SECTIONS = [
   [
     'Guide',
     [
-      ...['start', 'prepare', 'attributes', 'camera', 'loading', 'labels', 'animation', 'styling', 'events'].map(guide),
+      ...[
+        'start',
+        'concepts',
+        'prepare',
+        'attributes',
+        'camera',
+        'loading',
+        'labels',
+        'animation',
+        'styling',
+        'events',
+      ].map(guide),
       ...[
         'scenes-and-meshes',
         'effects',
@@ -24,7 +35,7 @@ const SECTIONS = [
       /^packages\/(element|react)\/README/,
     ],
   ],
-  ['Help', ['troubleshooting', 'browsers', 'limits', 'compare'].map(guide)],
+  ['Help', ['troubleshooting', 'browsers', 'limits', 'compare', 'coming-from'].map(guide)],
   [
     'Generators',
     [guide('own-generator'), /^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/],
@@ -32,7 +43,7 @@ const SECTIONS = [
   ['Accuracy and speed', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
   [
     'Without the element',
-    [guide(''), /^packages\/(renderer|three|formats|core|cli)\/README/, /^docs\/(detail-pages|sequences)/],
+    [guide(''), /^packages\/(renderer|three|formats|core|cli)\/README/, /^docs\/(lod-format|sequences)/],
   ],
   ['For contributors', [/^CONTRIBUTING/, /^docs\/architecture/, /^packages\//, /^scripts\//, /^README/]],
   ['Decisions', [/^docs\/decisions\//]],
@@ -57,7 +68,9 @@ function listDocuments() {
   const sources = [
     ...AT_ROOT.filter((name) => existsSync(join(root, name))),
     ...['docs', 'packages', 'demo/generators', 'demo/scenes', 'scripts'].flatMap(markdownIn),
-  ].sort();
+  ]
+    .filter((source) => source !== 'docs/README.md') // The site's own list of documents replaces it.
+    .sort();
   const taken = new Set();
   return SECTIONS.flatMap(([section, rules]) =>
     rules.flatMap((rule) => {

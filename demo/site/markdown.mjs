@@ -7,7 +7,7 @@ import { pageFolders, relativeAddress } from './links.mjs';
 
 /** Folders and files of the repository that have an address on the site, besides the documents. */
 const ADDRESSES = [
-  [/^docs\/(?:decisions|guide)\/?$/, '/docs/'],
+  [/^docs\/(?:README\.md|(?:decisions|guide)\/?)$/, '/docs/'],
   [/^docs\/frontier\/?$/, '/frontier/'],
   [/^docs\/frontier\/(.+)$/, '/frontier/data/$1'],
   [/^docs\/stability\/(.+)$/, '/stability/data/$1'],

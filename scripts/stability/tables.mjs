@@ -1,34 +1,36 @@
 /** The tables of docs/stability.md. */
 import { latestOf, titleOf } from './figures.mjs';
 
-/** Who measured: adapter, driver, when, and how much of the catalogue. */
+/** The adapters that measured: name, driver, date of the last run, failed rows. */
 export function describeRuns(runs, rows) {
-  const lines = runs.map((run) => {
-    const own = rows.map(({ id }) => run.rows[id]).filter(Boolean);
-    const whole = own.filter(isWhole).length;
-    const failed = rows.filter(({ id }) => run.rows[id]?.passed === false).map(({ id }) => id);
-    const name = titleOf(run.adapter);
-    return `| ${name} | ${cell(run.adapter.description)} | ${latestOf(run).slice(0, 10)} | ${whole} of ${own.length} | ${failed.join(', ') || 'none'} |`;
-  });
-  return `| adapter | driver | last run | rows of which the whole recipe ran | rows with a test that failed |\n|---|---|---|---|---|\n${lines.join('\n')}\n`;
+  return runs
+    .map((run) => {
+      const failed = rows.filter(({ id }) => run.rows[id]?.passed === false).map(({ id }) => id);
+      const result = failed.length > 0 ? `failed: ${failed.join(', ')}` : 'no failed row';
+      return `${titleOf(run.adapter)} (${cell(run.adapter.description)}, ${latestOf(run).slice(0, 10)}): ${result}.`;
+    })
+    .join(' ');
 }
 
-/** A row's figures, a column for each adapter, and who failed it. Rows that are tests alone have none. */
-export function rowTable(id, runs) {
-  const able = runs.filter(({ rows }) => rows[id] !== undefined);
-  const failed = able.filter(({ rows }) => rows[id].passed === false).map(({ adapter }) => titleOf(adapter));
-  const parts = failed.length > 0 ? [`**A test of this row failed on ${failed.join(', ')}.**\n`] : [];
-  const columns = able.filter(({ rows }) => rows[id].figures.length > 0);
-  if (columns.length === 0) return parts;
-  const names = columns.map(({ adapter, rows }) => `${titleOf(adapter)}${isWhole(rows[id]) ? '' : ', a part'}`);
-  const lines = linesOf(columns.map(({ rows }) => rows[id].figures)).map(({ what, unit, limit, values }) => {
-    const cells = values.map((value) => (value === undefined ? '' : `${shown(value)} ${unit}`.trim()));
-    return `| ${cell(what)} | ${limit} | ${cells.join(' | ')} |`;
+/** One line for each row of the catalogue: its failure, the limits kept on each adapter, and its test. */
+export function catalogueTable(rows, runs) {
+  const lines = rows.map((row) => {
+    const results = runs.map((run) => resultOf(run.rows[row.id]));
+    return `| [${row.id}](../${row.file}) | ${cell(row.title)} | ${results.join(' | ')} |`;
   });
-  parts.push(
-    `| what | limit | ${names.join(' | ')} |\n|---|---|${names.map(() => '---|').join('')}\n${lines.join('\n')}\n`,
+  const names = runs.map(({ adapter }) => titleOf(adapter));
+  return `| test | failure | ${names.join(' | ')} |\n|---|---|${names.map(() => '---|').join('')}\n${lines.join('\n')}\n`;
+}
+
+/** Limits kept of limits tested; an asterisk if the short recipe ran. */
+function resultOf(row) {
+  if (row === undefined) return '';
+  const limited = row.figures.filter(({ atLeast, atMost }) => atLeast !== undefined || atMost !== undefined);
+  const kept = limited.filter(
+    ({ value, atLeast = -Infinity, atMost = Infinity }) => value >= atLeast && value <= atMost,
   );
-  return parts;
+  const text = `${kept.length}/${limited.length}${isWhole(row) ? '' : '*'}`;
+  return row.passed === false ? `**failed**, ${text}` : text;
 }
 
 export const isWhole = ({ figures }) => figures.every(({ isFull }) => isFull);
@@ -51,22 +53,20 @@ export function limitOf({ atLeast, atMost }) {
   return parts.filter(Boolean).join(', ');
 }
 
-/** The rows that a page can draw: every subject of the first adapter, ours on the others beside it. */
+/** Rows that a page can draw: ours on the first adapter beside peers as shipped. The site shows the other adapters and settings. */
 export function pagesTable(pages) {
-  const subjects = subjectsOf(pages);
+  const subjects = subjectsOf(pages.slice(0, 1)).filter(({ name }) => !name.endsWith(', parity'));
   const lines = [
-    '## The same rows, with peers\n',
-    `Same splats, same views, same criterion, in one page of Chromium (${pages[0].adapter || 'SwiftShader'} where no other adapter is named), after rounding to 8 bits. Fails are in bold. The first row is no failure but a measure: a peer's\ndefault picture is that far from the reference on any scene, by its own rules of falloff and dilation; what a row adds is the difference to it. Our limits hold for the reference picture, which peers do not aim at.\n`,
-    `| row | at least | ${subjects.map(({ name }) => name).join(' | ')} |`,
-    `|---|---|${subjects.map(() => '---').join('|')}|`,
-    ...pages[0].rows.map(({ row, title, least }) => {
+    `| row | ${subjects.map(({ name }) => name).join(' | ')} |`,
+    `|---|${subjects.map(() => '---').join('|')}|`,
+    ...pages[0].rows.map(({ row, title }) => {
       const entry = ({ results }) => {
         const { figure, unit, passes, error } = results.get(`${row} ${title}`) ?? {};
         if (passes === undefined) return '';
-        const text = error ? cell(error) : `${figure.toFixed(unit === 'dB' ? 1 : 0)} ${unit}`;
+        const text = error ? 'none' : figure.toFixed(unit === 'dB' ? 1 : 0);
         return passes ? text : `**${text}**`;
       };
-      return `| ${row}, ${cell(title)} | ${least === undefined ? '0 bytes' : `${least} dB`} | ${subjects.map(entry).join(' | ')} |`;
+      return `| ${row}, ${cell(title)} | ${subjects.map(entry).join(' | ')} |`;
     }),
   ];
   return `${lines.join('\n')}\n`;
@@ -85,9 +85,3 @@ export function subjectsOf(pages) {
 }
 
 const cell = (text) => text.replace(/\|/g, '\\|').replace(/\s+/g, ' ');
-
-export function shown(value) {
-  if (value === 'Infinity') return 'equal, infinitely many';
-  if (typeof value !== 'number' || Number.isInteger(value)) return String(value);
-  return Math.abs(value) < 0.01 ? value.toExponential(1) : String(Number(value.toPrecision(4)));
-}

@@ -2,7 +2,7 @@
 
 const CODE = '`'; // What stands for a piece of code: one word, and none that a list of words could have.
 
-/** @returns {{ line: number, text: string, isHeading: boolean }[]} paragraphs, items, cells and headings of Markdown. */
+/** @returns {{ line: number, text: string, isHeading: boolean, isCell: boolean }[]} paragraphs, items, cells and headings of Markdown. */
 export function blocksOfMarkdown(source) {
   const lines = blank(source, /^---\n[\s\S]*?\n---\n/)
     .replace(/^(```|~~~)[^\n]*\n[\s\S]*?^\1/gm, emptied)
@@ -16,7 +16,7 @@ export function blocksOfMarkdown(source) {
     if (line === '' || /^([-*_] ?){3,}$/.test(line) || /^\|[\s:|-]+\|$/.test(line)) return close();
     if (line.startsWith('|')) {
       close();
-      for (const cell of line.replace(/\\\|/g, '/').split('|')) push(plain(cell), i);
+      for (const cell of line.replace(/\\\|/g, '/').split('|')) push(plain(cell), i, false, true);
       return;
     }
     const starts = /^(#{1,6} |[-*+] |\d+\. |> )/.exec(line);
@@ -28,9 +28,9 @@ export function blocksOfMarkdown(source) {
   });
   return blocks;
 
-  function push(text, i, isHeading = false) {
+  function push(text, i, isHeading = false, isCell = false) {
     if (text.trim() === '') return undefined;
-    const block = { line: i + 1, text: text.trim(), isHeading };
+    const block = { line: i + 1, text: text.trim(), isHeading, isCell };
     blocks.push(block);
     return block;
   }

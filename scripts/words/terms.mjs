@@ -20,17 +20,78 @@ export const RETIRED = [
   [/\b(one|the|each|measured) choice of variants\b/i, 'autotune'],
   [/\bknown answers?\b/i, 'self-test'],
   [/\blive (generators?|models?|scenes?)\b/i, 'generator, dynamic'],
-  [/\bpeople('s|’s)?\b/i, 'visitors, authors, callers'],
   [/\b(some|any|no|every)body('s|’s)?\b|\bwho(so)?ever\b|\bwhom\b/i, 'visitors, authors, callers; or the passive'],
   [/\bwhatever\b/i, 'name what: any, all, each'],
   [/\bso (many|much)\b/i, 'a number: n, as many as'],
   [/\bso (far|long)\b/i, 'until now, as long as, up to there'],
 ];
 
-/** The first retired word of a text, if there is one: `{ found, instead, at }`. */
-export function retiredIn(text) {
-  const hits = RETIRED.flatMap(([pattern, instead]) =>
-    [...text.matchAll(new RegExp(pattern.source, 'gi'))].map(({ 0: found, index: at }) => ({ found, instead, at })),
-  );
+/** Retired in documents and pages. Comments and strings follow with the renames: `npm run lint:words -- --inside` counts them. */
+export const RETIRED_IN_DOCUMENTS = [
+  [/\b(gives?|gave|given|giving) way\b/i, 'is replaced by, is dismissed'],
+  [/\b(in|into|out of) sight\b/i, 'visible, in the viewport, off-screen'],
+  [/\bsets? out\b/i, 'starts moving to'],
+  [/\btell(s|ing)?\b(?! (the|vue|react|typescript)('s)? compiler)/i, 'reports, shows, distinguishes'],
+  [
+    /\b(each|every|last|next|two|one|no|between|makes?) looks?\b|\blooks? (into|back|ahead)\b/i,
+    'feedback pass, read-back, sample',
+  ],
+  [/\b[Aa]s of\b(?= (`|<|the (last|first)|those|all|HTML|a ))/, 'same as on; since'],
+  [/\b(a|an|the|this|that|no|each|its|least|most) shares?\b|\bshares? of\b/i, 'fraction, ratio, percentage; shard'],
+  [/\banew\b/i, 'again'],
+  [/\blikewise\b/i, 'also; the same'],
+  [/\bby (itself|themselves)\b/i, 'automatically, on its own'],
+  [/\bmend(s|ed|ing)?\b/i, 'fix, recover'],
+  [/\bsome (?=\d|tenths|ten |half a|few )/i, 'about'],
+  [/\bbut for\b/i, 'except for'],
+  [/\b(is|are|was|were|be) begun\b/i, 'starts'],
+  [/\bsees? to\b/i, 'manages, ensures'],
+  [/\bhears?\b/i, 'is called with'],
+  [/\bin disguise\b/i, 'software adapter'],
+  [/\b(page['’]s (own )?thread|thread of (the|a) page)\b/i, 'main thread'],
+  [/(?<!post-)\bprocessors?\b/i, 'CPU; a post-processor is exempt'],
+  [/\bmade (scenes?|splats?|ones)\b/i, 'synthetic'],
+  [/\btrue ones?\b/i, 'reference'],
+  [/\bdB (or more )?(from|of|nearer|away)\b/i, 'dB PSNR (against the reference)'],
+  [/\bnumbers of (the )?([a-z]+ )?(splats|survivors)\b/i, 'indices'],
+  [/\bcome of (it|them|two|one)\b|\bwhat (comes|came) of\b/i, 'result'],
+  [
+    /\b(is|are|was|were) there\b(?=[.,;:)]| (already|yet|now|when|once|before|until|at once|by))/i,
+    'available, loaded, resident',
+  ],
+  [/\bgo(es)? (along|on)\b(?! (a|the|one|any)\b)/i, 'continue'],
+  [/\bat hand\b/i, 'available, present'],
+  [/\bin the mean\b/i, 'on average'],
+  [/\bstrangers\b/i, 'untrusted'],
+  [/\bpersons\b/i, 'people'],
+  [/\b(Most|Least|Fewest) (?=[a-z]+s? (that|of|at|a|in)\b)/, 'maximum, minimum'],
+  [
+    /(^|[.:] )What (?=(is|was|are|has|have|it|they|a|an|the|comes|lies|stays|else|changes|moves|follows)\b)/m,
+    'begin with the noun or the verb',
+  ],
+];
+/** A heading or the label of a link may begin with What. */
+const NOT_IN_HEADINGS = RETIRED_IN_DOCUMENTS.at(-1)[0];
+
+/** Words that are right at times: upper limits of their number per 1,000 words. */
+export const RATES = {
+  where: /\bwhere\b/gi,
+  'what-clauses':
+    /\bwhat (is|was|are|were|has|have|had|it|they|a|an|the|comes|came|lies|stays|else|changes|moves|follows|holds|needs|would|others)\b/gi,
+  'of which': /\b(of|by|in|for|to|at|from|between) which\b/gi,
+};
+
+/** Retired words of a text in their order: `{ found, instead, at }`. */
+export function retiredIn(text, { isDocument = false, isHeading = false } = {}) {
+  const patterns = isDocument ? [...RETIRED, ...RETIRED_IN_DOCUMENTS] : RETIRED;
+  const hits = patterns
+    .filter(([pattern]) => !(isHeading && pattern === NOT_IN_HEADINGS))
+    .flatMap(([pattern, instead]) =>
+      [...text.matchAll(new RegExp(pattern.source, `g${pattern.flags}`))].map(({ 0: found, index: at }) => ({
+        found,
+        instead,
+        at,
+      })),
+    );
   return hits.sort((a, b) => a.at - b.at);
 }

@@ -15,7 +15,7 @@ interface Run {
 }
 
 const { parseFigures, mergeRuns, mergePages, titleOf } = await scriptModule('stability/figures.mjs');
-const { describeRuns, rowTable, subjectsOf } = await scriptModule('stability/tables.mjs');
+const { catalogueTable, describeRuns, subjectsOf } = await scriptModule('stability/tables.mjs');
 
 const swiftShader = { vendor: 'google', architecture: 'swiftshader', device: 'x', description: 'driver 5' };
 const card = { vendor: 'nvidia', architecture: '', device: 'nvidia-h200', description: 'NVIDIA: 580' };
@@ -73,7 +73,7 @@ test('of each row the latest run of an adapter counts, in whatever order files a
   }
 });
 
-test('adapters stand side by side; a part of a recipe and a failure are told', () => {
+test('the table of rows has a column for each adapter, and shows short recipes and failures', () => {
   const runs: Run[] = mergeRuns([
     ...parse({ date: '2026-01-01T00:00:00Z', adapter: swiftShader }, figure('S1', '20 frames', 60, false)),
     ...parse(
@@ -81,12 +81,10 @@ test('adapters stand side by side; a part of a recipe and a failure are told', (
       ...[figure('S1', '200 frames', 61), { row: 'S1', passed: false }],
     ),
   ]);
-  const text = rowTable('S1', runs).join('\n');
-  assert.match(text, /failed on NVIDIA H200/);
-  assert.match(text, /\| what \| limit \| SwiftShader, a part \| NVIDIA H200 \|/);
-  assert.match(text, /\| 20 frames \| at least 59 \| 60 dB \| {2}\|/);
-  assert.match(text, /\| 200 frames \| at least 59 \| {2}\| 61 dB \|/);
-  assert.match(describeRuns(runs, [{ id: 'S1' }]), /\| NVIDIA H200 \| NVIDIA: 580 \| 2026-01-01 \| 1 of 1 \| S1 \|/);
+  const text = catalogueTable([{ id: 'S1', title: 'Popping', file: 'tests/a.ts' }], runs);
+  assert.match(text, /\| test \| failure \| SwiftShader \| NVIDIA H200 \|/);
+  assert.match(text, /\| \[S1\]\(\.\.\/tests\/a\.ts\) \| Popping \| 1\/1\* \| \*\*failed\*\*, 1\/1 \|/);
+  assert.match(describeRuns(runs, [{ id: 'S1' }]), /NVIDIA H200 \(NVIDIA: 580, 2026-01-01\): failed: S1\./);
 });
 
 test('reports of the page: one column of ours for each adapter, and a run without peers does not take theirs away', () => {

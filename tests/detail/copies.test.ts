@@ -12,7 +12,7 @@ import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 import { Renderer } from '../support/renderer.js';
 
-/** Words of a chunk's box, of its details, and of the geometry and harmonics (degree 1) of its splats: docs/detail-pages.md. */
+/** Words of a chunk's box, of its details, and of the geometry and harmonics (degree 1) of its splats: docs/lod-format.md. */
 const [BOX, DETAILS, GEOMETRY, SH] = [8, 12, 8 * constants.CULL_GROUP, 4 * constants.CULL_GROUP];
 /** Of which no coordinate is a float32. */
 const places = [0, 1, 2].map((k): Vector3 => [14.1 * k, 0.3 * k, -3.7 * k]);

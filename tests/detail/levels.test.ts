@@ -30,7 +30,7 @@ const viewFrom = (distance: number, angle = 0.4, x = 0): Camera =>
     ...{ width: 96, height: 64, fovXDegrees: 60, near: 0.01 },
   });
 
-/** Bytes of a slot, by what a page of docs/detail-pages.md has. */
+/** Bytes of a slot, by what a page of docs/lod-format.md has. */
 function slotBytes({ scene }: PageSource): number {
   const words = { int8: [2, 4, 8, 14], float16: [2, 6, 14, 24] }[scene.shPrecision][scene.shDegree];
   return 4 * SLOT_CHUNKS * (8 + 12 + 8 + CULL_GROUP * (4 + words));

@@ -1,6 +1,6 @@
 /**
  * Cut, damaged and random files: every one is read or refused with a named error, soon and with little memory.
- * SECURITY.md: "Scene and model files are data from strangers".
+ * SECURITY.md: "Scene and model files are untrusted data".
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';

@@ -1,6 +1,6 @@
 /**
  * Damaged and hostile files: every one ends quickly, in a header or in an error that names the file.
- * SECURITY.md: "Scene and model files are data from strangers".
+ * SECURITY.md: "Scene and model files are untrusted data".
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';

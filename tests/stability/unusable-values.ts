@@ -8,7 +8,7 @@
  *
  * Passes: with bad splats of every kind mixed in, from a file and from a generator's tensors, the picture is bit for bit that of the scene
  * without them, and they are counted.
- * SECURITY.md: "Scene and model files are data from strangers".
+ * SECURITY.md: "Scene and model files are untrusted data".
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';

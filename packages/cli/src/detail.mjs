@@ -20,7 +20,7 @@ import { readWhole } from './lib/input-file.mjs';
 
 const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 
-  --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/detail-pages.md describes them
+  --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/lod-format.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
   --min-db DB     PSNR to SCENE over the covered pixels of held-out views that the finest pages reach, 30 to 60 (default 50): files are as small as that allows
   --scored N      views from everywhere that tell how splats are seen, 24 to 2000 (default 216): what shows little of the harmonics is rounded more

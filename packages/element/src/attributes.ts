@@ -113,7 +113,7 @@ export const ATTRIBUTES = {
    */
   src: text<string | Blob | null>(),
   /**
-   * As of `<img>`: `use-credentials` sends cookies to other origins.
+   * Same as on `<img>`: `use-credentials` sends cookies to other origins.
    * @default `anonymous`
    * @example crossorigin="use-credentials"
    */

@@ -149,7 +149,7 @@ export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true)
   return pages;
 }
 
-/** The words of a page's file: see docs/detail-pages.md. */
+/** The words of a page's file: see docs/lod-format.md. */
 export function packPage(tree: DetailTree, { holds, chunks }: BuiltPage): Uint32Array<ArrayBuffer> {
   const { levels, shPrecision, geometry: kind } = tree;
   const layout = pageLayout({ shDegree: levels[0].shDegree, shPrecision, geometry: kind }, chunks);

@@ -90,7 +90,7 @@ export interface PageEncoderOptions {
   readonly seen?: SeenSplats | undefined;
 }
 
-/** Writes coded files of pages: see docs/detail-pages.md. */
+/** Writes coded files of pages: see docs/lod-format.md. */
 export class PageEncoder {
   readonly #tree: DetailTree;
   readonly #coding: WrittenCoding;

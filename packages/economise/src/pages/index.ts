@@ -1,4 +1,4 @@
-/** Writes the folders of LOD pages that the renderer streams: see docs/detail-pages.md. */
+/** Writes the folders of LOD pages that the renderer streams: see docs/lod-format.md. */
 export {
   buildDetailTree,
   cutPages,

@@ -10,7 +10,7 @@ import { anglesGrammar, boxGrammar, opacityGrammar, pointGrammar, scaleGrammar }
 /** What both have. */
 const PLACED = {
   /**
-   * As of `<img>`: `use-credentials` sends cookies to other origins.
+   * Same as on `<img>`: `use-credentials` sends cookies to other origins.
    * @default that of the `<gaussian-splat>`
    * @example crossorigin="use-credentials"
    */
@@ -35,13 +35,7 @@ const PLACED = {
    */
   scale: read<readonly [number, number, number], string | number | readonly number[] | null>(scaleGrammar),
   /**
-   * Visitors may click it: `click`, `pointerover` and `pointerout` of the pointer come to it, with a property `hit`, and bubble; `Tab` reaches it, `Enter` clicks it.
-   * Name it with `aria-label`. `style="cursor: …"` is the cursor over it.
-   * @example interactive
-   */
-  interactive: flag(),
-  /**
-   * Plays by itself, on its own clock, as soon as it is shown. It does not start for visitors who ask for less motion. A button stops it.
+   * Plays automatically, on its own clock, as soon as it is shown. It does not start for visitors who ask for less motion. A button stops it.
    * @example autoplay
    */
   autoplay: flag(),
@@ -60,7 +54,7 @@ export const SCENE_ATTRIBUTES = {
   src: text<string | Blob | null>(),
   ...PLACED,
   /**
-   * What points up in the axes of the file, as of `<gaussian-splat>`. The scene is turned by it before it is placed.
+   * The axis of the file that points up, same as on `<gaussian-splat>`. The scene is turned by it before it is placed.
    * @default what the scene says, else `-y`
    * @example up="y"
    */

@@ -71,7 +71,7 @@ export const CUT_ATTRIBUTES = {
    */
   side: read<'inside' | 'outside'>(keywordGrammar(['inside', 'outside'])),
   /**
-   * `soft`: a splat at the edge changes by the share of it that lies on the side. `hard`: its center decides. A length makes the soft edge wider.
+   * `soft`: a splat at the edge changes by its fraction on that side. `hard`: its center decides. A length makes the soft edge wider.
    * @default `soft`
    * @example edge="10cm"
    */

@@ -1,4 +1,4 @@
-/** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
+/** Scenes that are streamed: page by page (docs/lod-format.md), or streamed SOG box by box. */
 import { partRequest } from '@gaussian-splat/core/fetch';
 import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';

@@ -1,7 +1,7 @@
 import { BUFFER_USAGE } from './kernel.js';
 import type { GpuMemory } from './memory.js';
 
-/** Bytes of a block. Of one that is not full all of it is transferred; larger ones were hardly faster to fill (docs/detail-pages.md). */
+/** Bytes of a block. Of one that is not full all of it is transferred; larger ones were hardly faster to fill (docs/lod-format.md). */
 export const BLOCK_BYTES = 1 << 18;
 
 /** Mapped memory, and how much of it has been written. */

@@ -39,7 +39,7 @@ export interface TreeInstance {
 
 /**
  * What `detail.json` says of a streamed scene.
- * docs/detail-pages.md describes the files.
+ * docs/lod-format.md describes the files.
  */
 export interface DetailManifest {
   readonly format: 'gaussian-splat-detail';

@@ -61,7 +61,7 @@ function quantizeRun({ geometry, chunks }: RunWords, level: SplatLevel): void {
   }
 }
 
-/** Puts runs one behind the other into slots: of each what docs/detail-pages.md describes, all but the last full. Nothing is above any of them. */
+/** Puts runs one behind the other into slots: of each what docs/lod-format.md describes, all but the last full. Nothing is above any of them. */
 export function joinSlots(runs: readonly PackedRun[], format: PageFormat): Uint32Array<ArrayBuffer> {
   const total = runs.reduce((sum, { chunks }) => sum + chunks.length / CHUNK_NUMBERS, 0);
   const words = new Uint32Array(pageLayout(format, 1).total * total);

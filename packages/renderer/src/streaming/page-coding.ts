@@ -4,7 +4,7 @@ import { shNumbers } from '../levels/splat-level.js';
 
 /**
  * How the splats of coded pages are rounded, the same in all files of a folder. A file says the rest: how far apart coordinates are in each chunk, and where sizes begin.
- * docs/detail-pages.md describes the files.
+ * docs/lod-format.md describes the files.
  */
 export interface PageCoding {
   /** Octaves between two sizes, 1/48 to 1. */

@@ -4,7 +4,7 @@ import { pageLayout, type PageFormat } from './manifest.js';
 
 /** Where the words of the chunks of a slot lie: in a file that other pages share, and that nobody may change. */
 export interface SlotWords {
-  /** Laid out as docs/detail-pages.md describes a file of {@link of} chunks. */
+  /** Laid out as docs/lod-format.md describes a file of {@link of} chunks. */
   readonly words: Uint32Array<ArrayBuffer>;
   readonly of: number;
   /** The first of the slot's chunks in it, and how many there are. */

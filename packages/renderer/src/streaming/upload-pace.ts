@@ -6,7 +6,7 @@ const GROWTH = 1 / 512;
 const [LEAST_MS, MOST_MS] = [1, 5];
 /**
  * Most bytes for one frame, whatever they cost the thread: what the GPU process and the GPU do with them is not measured. With so many in each frame few were late, with 20 MB
- * intervals of up to 110 ms were seen (docs/detail-pages.md).
+ * intervals of up to 110 ms were seen (docs/lod-format.md).
  */
 export const MOST_UPLOAD_BYTES = 14e6;
 /** What bytes are thought to cost before any has been uploaded: that of 650 MB a second. */
