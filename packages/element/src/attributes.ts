@@ -310,7 +310,7 @@ export const ATTRIBUTES = {
    */
   iosSrc: text(),
   /**
-   * How dark the shadow is on the ground under what is shown, 0 to 1. It is made of the splats and meshes themselves, once, and anew when they change.
+   * How dark the shadow is on the ground under what is shown, 0 to 1. It is made of the splats and meshes themselves, once, and again when they change.
    * @default `0`: none. AR has one of `1`
    * @example shadow-intensity="1"
    */
