@@ -35,6 +35,12 @@ const PLACED = {
    */
   scale: read<readonly [number, number, number], string | number | readonly number[] | null>(scaleGrammar),
   /**
+   * Visitors may click it: `click`, `pointerover` and `pointerout` of the pointer come to it, with a property `hit`, and bubble; `Tab` reaches it, `Enter` clicks it.
+   * Name it with `aria-label`. `style="cursor: …"` is the cursor over it.
+   * @example interactive
+   */
+  interactive: flag(),
+  /**
    * Plays automatically, on its own clock, as soon as it is shown. It does not start for visitors who ask for less motion. A button stops it.
    * @example autoplay
    */
