@@ -11,9 +11,11 @@ const DENO = '2.9.6';
 const CACHE = join(root, '.cache/wgpu');
 const LAVAPIPE = '/usr/share/vulkan/icd.d/lvp_icd.x86_64.json';
 /** Files whose limits lavapipe does not hold, and why. */
-const KNOWN = Object.fromEntries(
-  ['renderer-oracle', 'qualities', 'filters', 'world'].map((name) => [name, 'blending into rgba16float truncates']),
-);
+const TRUNCATED = ['renderer-oracle', 'qualities', 'filters', 'world', 'harmonics-degree', 'local-precision'];
+const KNOWN = {
+  ...Object.fromEntries(TRUNCATED.map((name) => [name, 'blending into rgba16float truncates: 56.7 to 58.2 dB'])),
+  invariants: `Deno ${DENO} panics in ext/webgpu/queue.rs at an image of no splats`,
+};
 const OPTIONS = ['--allow-all', '--no-check', '--unstable-webgpu', '--unstable-sloppy-imports'];
 const FILE_MS = 1_800_000;
 
@@ -40,7 +42,7 @@ function runFile(file) {
     ['test', ...OPTIONS, '--import-map', imports, join('tests/golden', file)],
     { cwd: root, env: { ...process.env, NO_COLOR: '1', ...drivers }, encoding: 'utf8', timeout: FILE_MS },
   );
-  const known = KNOWN[file.replace('.test.ts', '')];
+  const known = KNOWN[file.replace(/(\.lab)?\.test\.ts$/, '')];
   const [, counts] = /(\d+ passed.*\d+ (?:failed|ignored))/.exec(stdout) ?? [];
   const name = `${file}: ${counts ?? 'no tests'}`;
   const holds = status === 0 && counts !== undefined;
