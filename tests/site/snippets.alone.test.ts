@@ -31,7 +31,7 @@ import type { GaussianSplatElement } from '@gaussian-splat/react';
 declare global {
   const adapter: GPUAdapter;
   const device: GPUDevice;
-  const texture: GPUTextureView;
+  const texture: GPUTexture;
   const canvasTexture: GPUTexture;
   const tensor: GPUBuffer;
   const rows: number;
@@ -256,8 +256,28 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
     framesPerGroup: 4,
   });
   await tab.route('**/fountain.gsv', (route) => route.fulfill({ body: Buffer.from(clip.bytes) }));
+  await tab.route('**/fountain.mp3', (route) => route.fulfill({ contentType: 'audio/wav', body: silence() }));
+  await tab.route('**/fountain.vtt', (route) => route.fulfill({ contentType: 'text/vtt', body: 'WEBVTT\n' }));
   await tab.route('**/style.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/post-fixed.onnx') }));
   await tab.route(/\/(walker|ball)\.onnx$/, (route) => route.fulfill({ body: fixture('fixtures/generators/packed.onnx') })); // prettier-ignore
+}
+
+/** A second of silence: WAV of 8,000 samples of 8 bits. */
+function silence(): Buffer {
+  const wave = Buffer.alloc(44 + 8000, 128);
+  wave.write('RIFF', 0);
+  wave.writeUInt32LE(36 + 8000, 4);
+  wave.write('WAVEfmt ', 8);
+  wave.writeUInt32LE(16, 16);
+  wave.writeUInt16LE(1, 20); // PCM
+  wave.writeUInt16LE(1, 22); // channels
+  wave.writeUInt32LE(8000, 24); // samples a second
+  wave.writeUInt32LE(8000, 28); // bytes a second
+  wave.writeUInt16LE(1, 32); // bytes a sample
+  wave.writeUInt16LE(8, 34); // bits
+  wave.write('data', 36);
+  wave.writeUInt32LE(8000, 40);
+  return wave;
 }
 
 /** All of them on one page, each in a frame of its own document would be a device each: here they share one, as on any page. */

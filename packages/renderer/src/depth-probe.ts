@@ -6,7 +6,7 @@ import { BUFFER_USAGE, kernelOf, type ShaderDescription } from './gpu/kernel.js'
 import { GpuMemory } from './gpu/memory.js';
 import { readBack } from './gpu/read-back.js';
 import { Stage } from './stages/stage.js';
-import type { Placement } from './world.js';
+import type { ProbedSplat } from './probed-splat.js';
 
 /** A point of the image that was drawn last. */
 export interface ProbePoint {
@@ -35,17 +35,6 @@ export interface ProbeAnswer {
   readonly transmittance: number;
   /** The splat that {@link ProbeAnswer.depth} is of. Null where that is, and where something else than a splat is nearer. */
   readonly splat: ProbedSplat | null;
-}
-
-/** A splat of a scene. */
-export interface ProbedSplat {
-  /** Its place in the world; undefined where one scene is drawn alone: with WebGL. */
-  readonly placement: Placement | undefined;
-  /**
-   * Its number among those of its scene, in the order in which they are stored: of a file, `packedOrder` has their rows. Null where a scene has levels of detail, whose
-   * splats stand for several.
-   */
-  readonly index: number | null;
 }
 
 /** The frame to look into. */

@@ -1,11 +1,11 @@
 import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
-import type { ProbedSplat } from './depth-probe.js';
 import type { GaussianPage, PageRequests } from './gaussian-scene.js';
 import type { GeometryReading } from './geometry-reading.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
+import type { ProbedSplat } from './probed-splat.js';
 import type { RenderSettings } from './render-settings.js';
 import { cullGroups } from './stages/stage.js';
 import type { DetailBudget } from './stages/detail-budget.js';

@@ -37,7 +37,8 @@ export {
   rowLengths,
   widenReach,
 } from './streaming/quantized-geometry.js';
-export { type ProbeAnswer, type ProbedSplat, type ProbePoint } from './depth-probe.js';
+export { type ProbeAnswer, type ProbePoint } from './depth-probe.js';
+export { type ProbedSplat } from './probed-splat.js';
 export { type GaussianPage, type PageRequests } from './gaussian-scene.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
