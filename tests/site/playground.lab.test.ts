@@ -254,7 +254,12 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.waitForFunction(() => !document.querySelector<HTMLInputElement>('[data-side=right]')!.disabled);
     await tab.evaluate(() => document.querySelector<HTMLElement>('gaussian-splat')!.focus());
     await tab.keyboard.press('ArrowRight');
-    const [turned] = (await stateOf(tab)).view;
+    // The camera glides to its rest.
+    let [turned] = (await stateOf(tab)).view;
+    for (let before = ''; before !== turned; [turned] = (await stateOf(tab)).view) {
+      before = turned;
+      await tab.waitForTimeout(500);
+    }
     await tab.locator('[data-side=right]').fill('25');
     await boxIs([-2, -1, -2, 2]);
     await tab.waitForFunction(

@@ -39,6 +39,8 @@ export function hostileServer(otherOrigin) {
   };
 }
 
+/** Frames of the sequence that were fetched since `/net/sequence/asked` was. */
+const askedFrames = [];
 /** Ends of paths that are not found. */
 let lost = [];
 /** Chunks of a build in this folder are not found when they are asked for first; and how often each has been served. */
@@ -210,7 +212,9 @@ const ANSWERS = {
       context.body = JSON.stringify({ gaussianSplatSequence: 1, framesPerSecond: Number(fps), frames });
       return;
     }
+    if (name === 'asked') return void (context.body = JSON.stringify(askedFrames.splice(0)));
     const frame = Number.parseInt(name, 10);
+    askedFrames.push(frame);
     if (frame > 0) await delay(Number(ms));
     if (String(frame) === lost) return void (context.status = 404);
     context.body = ball(200 + 20 * (frame % 12), COLOURS[frame % 3]);
