@@ -71,10 +71,10 @@ describe('the CDN build', () => {
     assertEqual(parts().length - first, 0, 'parts that the page fetched for it and for another scene');
     // The manifest is fetched by the part of the element that reads it.
     assertEqual((await shown('/nowhere/detail.json')).error?.reason, 'network/status', 'a streamed scene');
-    assertEqual(parts().length - first, 4, 'parts for a streamed scene, two of them for sequences too');
+    assertEqual(parts().length - first, 5, 'parts for a streamed scene, two of them for sequences too');
     const sequence = await shown('/net/sequence/movie.json');
     assertEqual([sequence.error, sequence.duration], [null, 1.2], 'error and duration of a sequence');
-    assertEqual(parts().length - first, 6, 'parts for a sequence, one of them for all that moves');
+    assertEqual(parts().length - first, 7, 'parts for a sequence, one of them for all that moves');
   });
 
   it('on a page that refuses workers and inline styles reads on the main thread, with one warning', async () => {
