@@ -48,7 +48,8 @@ const BOXES = array<Box, 12>(
   Box(vec3f(0.0, 16.5, 0.0), vec3f(0.5, 0.05, 0.5), STRAIGHT, 100.0));
 
 @group(0) @binding(0) var level: texture_storage_2d_array<rgba16float, write>;
-@group(0) @binding(1) var sharper: texture_cube<f32>;
+// Six faces, not a cube: SwiftShader filters across the edges of a cube with texels that compute shaders do not update.
+@group(0) @binding(1) var sharper: texture_2d_array<f32>;
 @group(0) @binding(2) var linear: sampler;
 
 fn turned(v: vec3f, turn: vec2f) -> vec3f {
@@ -103,6 +104,21 @@ fn directionOf(id: vec3u, size: f32) -> vec3f {
   return normalize(faces[id.z]);
 }
 
+// The sharper level in a direction: inverse of directionOf.
+fn sampled(d: vec3f) -> f32 {
+  let a = abs(d);
+  var face = select(5, 4, d.z > 0.0);
+  var st = vec2f(select(-d.x, d.x, d.z > 0.0), -d.y) / a.z;
+  if (a.x >= a.y && a.x >= a.z) {
+    face = select(1, 0, d.x > 0.0);
+    st = vec2f(select(d.z, -d.z, d.x > 0.0), -d.y) / a.x;
+  } else if (a.y >= a.z) {
+    face = select(3, 2, d.y > 0.0);
+    st = vec2f(d.x, select(-d.z, d.z, d.y > 0.0)) / a.y;
+  }
+  return textureSampleLevel(sharper, linear, 0.5 * st + 0.5, face, 0.0).r;
+}
+
 // The direction of a spherical angle from another.
 fn around(axis: vec3f, cosTheta: f32, phi: f32) -> vec3f {
   let up = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 0.0, 1.0), abs(axis.z) < 0.999);
@@ -145,7 +161,7 @@ fn rougher(@builtin(global_invocation_id) id: vec3u) {
     // Of the reflected ray, sampled by visible normals (Heitz 2018).
     let cosTheta = (1.0 - u - alpha2 * u) / (1.0 - u + alpha2 * u);
     if (cosTheta <= 0.0) { continue; }
-    sum += cosTheta * textureSampleLevel(sharper, linear, around(direction, cosTheta, f32(i) * GOLDEN_ANGLE), 0.0).r;
+    sum += cosTheta * sampled(around(direction, cosTheta, f32(i) * GOLDEN_ANGLE));
     weights += cosTheta;
   }
   textureStore(level, id.xy, id.z, vec4f(vec3f(sum / weights), 1.0));
@@ -168,17 +184,14 @@ export async function makeEnvironment(device: GPUDevice, renderer: WebGPURendere
     mipLevelCount: LEVELS,
     usage: STORAGE_BINDING | TEXTURE_BINDING | COPY_SRC,
   });
-  const view = (baseMipLevel: number, dimension: GPUTextureViewDimension): GPUTextureView =>
-    cube.createView({ dimension, baseMipLevel, mipLevelCount: 1 });
+  const view = (baseMipLevel: number): GPUTextureView =>
+    cube.createView({ dimension: '2d-array', baseMipLevel, mipLevelCount: 1 });
   const linear = device.createSampler({ label, magFilter: 'linear', minFilter: 'linear' });
   const encoder = device.createCommandEncoder({ label });
   const target = targetOf(renderer);
   for (let level = 0; level < LEVELS; level++) {
     const pipeline = level === 0 ? mirror : rougher;
-    const resources = [
-      view(level, '2d-array'),
-      ...(level === 0 ? [] : [view(Math.min(level - 1, SHARPER), 'cube'), linear]),
-    ];
+    const resources = [view(level), ...(level === 0 ? [] : [view(Math.min(level - 1, SHARPER)), linear])];
     const pass = encoder.beginComputePass({ label });
     pass.setPipeline(pipeline);
     pass.setBindGroup(
