@@ -130,7 +130,7 @@ export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>
     return { file: Buffer.concat([head, file.subarray(start)]) };
   },
   'splats of a RAD of one colour': (n) => {
-    const count = Math.min(2_000_000, 100 * n);
+    const count = Math.min(500_000, 100 * n);
     const zeros = (length: number): Float32Array => new Float32Array(length);
     const cloud = { ...smallCloud(1, 3), count, positions: zeros(3 * count), scales: zeros(3 * count).fill(1) };
     const [opacities, rotations, sh] = [zeros(count).fill(1), zeros(4 * count).fill(1), zeros(48 * count)];
