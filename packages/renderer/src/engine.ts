@@ -18,7 +18,7 @@ export interface Accumulation {
 
 /** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
 export class Engine {
-  readonly levers: RenderSettings & Variants;
+  readonly settings: RenderSettings & Variants;
   readonly stages: Stages;
   readonly rasterizer: Rasterizer;
   readonly resources: FrameResources;
@@ -29,20 +29,20 @@ export class Engine {
   /** @throws GaussianSplatError `unsupported/limits` if the variant needs a feature that the device lacks. */
   constructor(
     device: GPUDevice,
-    levers: RenderSettings & Variants,
+    settings: RenderSettings & Variants,
     needs: { readonly pairsAtOnce: () => number; readonly onIncomplete: () => void },
   ) {
     this.#device = device;
-    this.levers = levers;
-    this.stages = makeStages(device, levers);
-    this.rasterizer = makeRasterizer(device, levers);
+    this.settings = settings;
+    this.stages = makeStages(device, settings);
+    this.rasterizer = makeRasterizer(device, settings);
     this.resources = new FrameResources(device, { stages: this.stages, rasterizer: this.rasterizer, ...needs });
   }
 
   /** Whether frames of these settings can be drawn with it. */
   serves({ rasterizer, accumulation, threads }: Variants): boolean {
-    const { levers } = this;
-    return rasterizer === levers.rasterizer && accumulation === levers.accumulation && threads === levers.threads;
+    const { settings } = this;
+    return rasterizer === settings.rasterizer && accumulation === settings.accumulation && threads === settings.threads;
   }
 
   get byteLength(): number {
@@ -70,7 +70,7 @@ export class Engine {
         texture.destroy();
         all.delete(old);
       }
-      const texture = new AccumulationTexture(this.#device, this.levers.accumulation, width, height);
+      const texture = new AccumulationTexture(this.#device, this.settings.accumulation, width, height);
       found = { texture, compose: bind(texture.view) };
     }
     all.set(key, found);
