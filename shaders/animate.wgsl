@@ -1,5 +1,6 @@
-// Puts the splats of a part of a clip where they are in a frame: one thread for each row, and one workgroup for each chunk, whose bounds it finds. What a number of a splat differs by
-// from its base is a sum of curves that all splats share, each as much as its code says. Rows beyond the part, and splats that are not in the frame, paint nothing.
+// Evaluates one part of a clip at one frame: one thread for each row, and one workgroup for each chunk, whose bounds it
+// computes. Each attribute differs from its base by a sum of curves that all splats share, weighted by the codes of the
+// splat. Rows beyond the part, and splats that are absent from the frame, become transparent.
 #import shared/sh
 #import shared/written_gaussian
 #import shared/group
@@ -8,25 +9,25 @@ struct Animate {
   // Curves of positions, rotations, scales and opacities.
   ranks: vec4u,
   color_rank: u32,
-  // Curves of all attributes together: numbers of a row of `curves`.
+  // Curves of all attributes together: the length of a row of `curves`.
   curve_count: u32,
-  // Of the group.
+  // Index of the frame within the group.
   frame: u32,
-  // Splats of the part, and rows that are written from `first_row` on, a multiple of CULL_GROUP.
+  // Splats of the part, and the rows that are written from `first_row` on, a multiple of CULL_GROUP.
   rows: u32,
   row_room: u32,
   first_row: u32,
-  // Codes of a plane: `rows`, made even.
+  // Codes of a plane: `rows`, rounded up to an even number.
   plane_codes: u32,
   sh_degree: u32,
   // Factor of all scales.
   grow: f32,
 }
 
-// As it was written: numbers before motion.
+// The base of a splat: its attributes before motion.
 struct Base {
   position: vec3f,
-  // In the lower half the first frame that the splat is in, in the upper one the frame after its last.
+  // Lower half: the first frame that contains the splat. Upper half: the frame after its last.
   life: u32,
   scales: vec3f,
   opacity: f32,
@@ -37,9 +38,9 @@ struct Base {
 @group(0) @binding(0) var<uniform> animate: Animate;
 @group(0) @binding(1) var<storage, read> bases: array<Base>;
 @group(0) @binding(2) var<storage, read> base_sh: array<vec2u>;
-// Two codes of 16 bits a word, plane by plane.
+// Two 16-bit codes in each word, plane by plane.
 @group(0) @binding(3) var<storage, read> codes: array<u32>;
-// [frames, curve_count], times the steps of codes.
+// [frames, curve_count], multiplied by the quantization steps of the codes.
 @group(0) @binding(4) var<storage, read> curves: array<f32>;
 @group(0) @binding(5) var<storage, read_write> gaussians: array<PackedGaussian>;
 @group(0) @binding(6) var<storage, read_write> sh: array<vec2u>;
@@ -47,11 +48,11 @@ struct Base {
 
 fn code(plane: u32, row: u32) -> f32 {
   let at = plane * animate.plane_codes + row;
-  // The sign comes from the highest bit.
+  // The shift to the highest bit extends the sign.
   return f32(bitcast<i32>(codes[at / 2u] << (16u * (1u - (at & 1u)))) >> 16u);
 }
 
-// What a number differs by: codes of its curves lie in planes from `plane` on, and its curves from `curve` on.
+// The change of one number: its codes lie in the planes from `plane` on, its curves start at `curve`.
 fn change(plane: u32, curve: u32, rank: u32, row: u32) -> f32 {
   var sum = 0.0;
   let first = animate.frame * animate.curve_count + curve;
@@ -65,7 +66,7 @@ fn change_of_three(plane: u32, curve: u32, rank: u32, row: u32) -> vec3f {
   );
 }
 
-// A quaternion turned further, about an axis as long as the angle.
+// Rotates a quaternion further; the length of `turn` is the angle in radians.
 fn turned(q: vec4f, turn: vec3f) -> vec4f {
   let angle = length(turn);
   let s = select(0.5, sin(0.5 * angle) / angle, angle > 1e-6);

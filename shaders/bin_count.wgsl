@@ -1,4 +1,4 @@
-// How many bins each splat touches: one thread for each splat, in depth order; the sum of each group of 256.
+// Counts the bins that each splat touches: one thread for each splat, in depth order; also sums each group of 256.
 #import shared/bin_side
 #import shared/coverage
 #import shared/plan
@@ -9,17 +9,17 @@
 @group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
 @group(0) @binding(3) var<storage, read> order: array<u32>;
-// Bins of each splat: first column, first row, columns, rows, a byte each.
+// Bins of each splat: first column, first row, columns, rows, one byte each.
 @group(0) @binding(4) var<storage, read_write> rects: array<u32>;
 @group(0) @binding(5) var<storage, read_write> group_pairs: array<u32>;
 
 fn bin_rect(s: ProjectedSplat) -> u32 {
   let c = coverage_of(s);
   let size = bin_size();
-  // Pixel centres are what counts, half a pixel inside the edges.
+  // Only pixel centers count, which are half a pixel inside the edges.
   let low = clamp(c.center - c.extent - 0.5, vec2f(0.0), view.viewport - 1.0);
   let high = clamp(c.center + c.extent + 0.5, vec2f(0.0), view.viewport - 1.0);
-  // Whole numbers within the image, whatever was rounded: a bin that is not there would be written over others' ranges.
+  // Clamped after rounding, because a bin outside the image would be written over the ranges of other bins.
   let first = min(vec2u(low / size), view.bins - 1u);
   let count = clamp(vec2u(high / size), first, view.bins - 1u) - first + 1u;
   return first.x | (first.y << 8u) | (count.x << 16u) | (count.y << 24u);

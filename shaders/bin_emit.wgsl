@@ -1,5 +1,5 @@
-// Writes the pairs of splat and bin, in depth order. The threads of a group share its pairs evenly, so that one huge splat
-// does not hold up the others.
+// Writes the pairs of splat and bin, in depth order. The threads of a group divide its pairs evenly, so that one huge
+// splat does not delay the others.
 #import shared/bins
 #import shared/plan
 #import shared/group
@@ -19,7 +19,7 @@
 // Inclusive prefix sums of the pairs of each splat of the group.
 var<workgroup> ends: array<u32, PREFIX_THREADS>;
 
-// The splat of the group that pair number p belongs to: the first whose prefix sum exceeds p.
+// The splat of the group that owns pair number p: the first with a prefix sum above p.
 fn owner_of(p: u32) -> u32 {
   var low = 0u;
   for (var step = PREFIX_THREADS / 2u; step > 0u; step /= 2u) {

@@ -1,5 +1,5 @@
-// Where each bin begins and ends among the pairs, once they are sorted by bin; and for each tile of a bin a bit for each pair, so that
-// a tile finds the few that touch it without reading the others.
+// Finds the range of each bin in the pairs sorted by bin. Also sets, for each tile of a bin, one bit for each pair that
+// touches it, so that a tile skips all other pairs.
 #import shared/bin_side
 #import shared/coverage
 #import shared/plan
@@ -9,22 +9,23 @@
 // Bins of the sorted pairs.
 @group(0) @binding(1) var<storage, read> bins: array<u32>;
 @group(0) @binding(2) var<storage, read> pairs: array<u32>;
-// First pair of each bin and the one behind the last; equal where a bin is empty.
+// First pair of each bin and the one after its last; both are equal if a bin is empty.
 @group(0) @binding(3) var<storage, read_write> ranges: array<vec2u>;
 // See tile_word.
 @group(0) @binding(4) var<storage, read_write> tile_bits: array<u32>;
 @group(0) @binding(5) var<uniform> view: BinView;
 @group(0) @binding(6) var<storage, read> splats: array<ProjectedSplat>;
 
-// Rows of 32 masks, one word apart, so that threads that read a column each meet other banks of the memory.
+// Rows of 32 masks, padded by one word so that threads that read a column access different memory banks.
 const MASK_ROW = 33u;
 var<workgroup> masks: array<u32, MASK_ROW * PAIR_WORDS>;
 
-// The tiles of a bin that a splat touches, a bit each, rows of eight.
+// Mask of the tiles of a bin that a splat touches: one bit each, in rows of eight.
 fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
   let corner = vec2f(bin) * bin_size();
   let tile = f32(tile_side);
-  // Row k holds the pixel centers k·tile + 0.5 ... (k + 1)·tile - 0.5. Only the rows at hand: threads side by side have others.
+  // Row k holds the pixel centers k·tile + 0.5 ... (k + 1)·tile - 0.5. The loop covers only the rows that the splat
+  // touches, because neighboring threads touch other rows.
   let low = c.center.y - c.extent.y - corner.y - RIM;
   let high = c.center.y + c.extent.y - corner.y + RIM;
   let first_row = clamp(ceil((low - (tile - 0.5)) / tile), 0.0, f32(BIN_ROWS));
@@ -59,7 +60,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   }
   masks[MASK_ROW * (lane / 32u) + lane % 32u] = mask;
   workgroupBarrier();
-  // Thread lane writes word lane of the group: of this tile, for these 32 pairs.
+  // Thread `lane` writes word `lane` of the group: the bits of this tile for these 32 pairs.
   let tile = lane / PAIR_WORDS;
   let row = MASK_ROW * (lane % PAIR_WORDS);
   var word = 0u;

@@ -1,4 +1,4 @@
-// The order in which bins are painted: those with the most pairs first, so that none of them begins when all others are done. Bins whose numbers of pairs differ by
+// Orders bins by their number of pairs, largest first, so that no long bin starts last. Bins whose numbers differ by
 // less than a fifth come in any order.
 #import shared/bins
 #import shared/prefix
@@ -7,13 +7,13 @@
 @group(0) @binding(1) var<storage, read> ranges: array<vec2u>;
 @group(0) @binding(2) var<storage, read_write> bin_order: array<u32>;
 
-// Four for each doubling of the number of pairs.
+// Four classes for each doubling of the number of pairs.
 const ORDER_CLASSES = 128u;
-// The class of a single pair, were classes counted from the shortest list.
+// The class of a list with one pair, if classes were counted from the shortest list.
 const FIRST_CLASS = 508u;
 var<workgroup> places: array<atomic<u32>, ORDER_CLASSES>;
 
-// Counted from the longest list: exponent and first two digits of a float32.
+// The class counted from the longest list: exponent and first two bits of the mantissa of a float32.
 fn class_of(bin: u32) -> u32 {
   let range = ranges[bin];
   let quarters = (bitcast<u32>(f32(max(range.y - range.x, 1u))) >> 21u) - FIRST_CLASS;

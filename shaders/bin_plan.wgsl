@@ -1,4 +1,5 @@
-// Sums up the pairs of each group of splats and counts them in the same struct as the splats, so that the same sort serves both; empties the bins.
+// Sums the pairs of each group of splats and writes their count into the same struct as that of the splats, so that the
+// same sort serves both; also clears the bins.
 #import shared/scan
 #import shared/bins
 #import shared/plan

@@ -1,4 +1,4 @@
-// Blends a layer of what else is in the picture over the splats behind it: for quads.
+// Blends one layer of the meshes over the splats behind it, for the rasterizer with quads.
 #import shared/scene_depth
 #import shared/full_screen
 
@@ -8,7 +8,7 @@
 @group(0) @binding(3) var second_depth: texture_2d<f32>;
 @group(0) @binding(4) var second_color: texture_2d<f32>;
 
-// Which, counted from the nearest one.
+// Index of the layer, counted from the nearest.
 override nth: u32 = 0u;
 
 @fragment

@@ -1,17 +1,17 @@
-// Lists the visible splats of a page in the file's order: survivors[slot] = number of the splat among all, pages and their
-// last, partly filled chunks counted as whole chunks.
+// Lists the visible splats of a block in the order of the file: survivors[slot] = index of the splat among all blocks.
+// The last, partly filled chunk of a block counts as a whole chunk.
 #import shared/view
 #import shared/group
 
 @group(0) @binding(0) var<uniform> view: View;
-// A bit for each splat, two vectors for a group.
+// One bit for each splat: two vectors for each group.
 @group(0) @binding(1) var<storage, read> visible_bits: array<vec4u>;
 @group(0) @binding(2) var<storage, read> group_offsets: array<u32>;
 @group(0) @binding(3) var<storage, read_write> survivors: array<u32>;
 
 const VECTORS_PER_GROUP = WORDS_PER_GROUP / 4u;
 
-// Bits that are set in the words of a vector before its word number `end`.
+// Counts the bits set in the words of a vector before word `end`.
 fn bits_before(words: vec4u, end: i32) -> u32 {
   return dot(select(vec4u(0u), countOneBits(words), vec4i(0, 1, 2, 3) < vec4i(end)), vec4u(1u));
 }
@@ -21,7 +21,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let chunk = group_index(workgroup_id);
   if (chunk * CULL_GROUP >= view.splat_count) { return; }
   let group = view.first_group + chunk;
-  // No survivors, as of most groups of a scene that is seen from within.
+  // The group has no survivors, as most groups of a scene that surrounds the camera.
   if (group_offsets[group] == group_offsets[group + 1u]) { return; }
   let low = visible_bits[VECTORS_PER_GROUP * group];
   let high = visible_bits[VECTORS_PER_GROUP * group + 1u];

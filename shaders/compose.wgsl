@@ -1,9 +1,10 @@
-// Composes by drawing, into any renderable target.
+// Composes by drawing, so that the target may have any renderable format.
 #import shared/compose
 #import shared/full_screen
 #import shared/srgb
 
-// True for targets that encode what is written: colours are encoded already, as scenes are trained.
+// True for targets that apply the sRGB encoding on store: colors are decoded before, because scenes are trained in
+// encoded colors.
 override is_encoding: bool = false;
 
 @fragment

@@ -1,12 +1,13 @@
-// Composes into a target of linear light. Splats are blended as they were trained, in encoded colours, with what is behind them, too.
+// Composes into a target of linear light. Splats and the content behind them are blended in encoded colors, as scenes
+// are trained.
 #import shared/compose
 #import shared/full_screen
 #import shared/srgb
 
-// What the target held, in linear light.
+// The previous content of the target, in linear light.
 @group(0) @binding(2) var content: texture_2d<f32>;
 
-// True if that is behind the splats, false if the background is.
+// True to blend splats over that content, false to blend them over the background.
 override keeps: bool = true;
 
 fn encoded(c: vec3f) -> vec3f {
@@ -19,7 +20,7 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
   var behind = compose.background;
   if (keeps) {
     let held = textureLoad(content, vec2u(position.xy), 0);
-    // Nothing was painted here: the content stays what it was, to the last bit.
+    // No splat covers the pixel, so the content is returned bit for bit.
     if (pixel.a >= 1.0) { return held; }
     behind = vec4f(encoded(held.rgb), held.a);
   }

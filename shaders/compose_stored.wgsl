@@ -1,4 +1,4 @@
-// Composes without drawing, into a target that a compute shader may write: some GPUs that compute fast draw slowly.
+// Composes in a compute shader, into a storage texture: some GPUs compute fast but draw slowly.
 #import shared/compose
 
 @group(0) @binding(2) var image: texture_storage_2d<rgba16float, write>;

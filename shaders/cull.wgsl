@@ -1,6 +1,6 @@
-// Which splats of the chunks that are drawn paint anything: one thread per splat, one bit of `visible_bits` per splat, and the number
-// of visible splats of each group of 256. Bits and counts, not atomic slots, so that compaction keeps the file's order and
-// equal depths never flicker.
+// Finds the visible splats of the chunks that are drawn: one thread and one bit of `visible_bits` for each splat, and
+// the number of visible splats of each group of 256. Bits and counts replace atomic slots, so that compaction keeps the
+// order of the file and splats of equal depth never flicker.
 #import shared/visibility
 #import shared/group
 #import shared/gathered

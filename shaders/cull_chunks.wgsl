@@ -1,16 +1,17 @@
-// In which share each chunk of a page is drawn: 0 where it holds no visible splat, or is coarser or finer than the view asks for. One thread for each chunk.
+// Finds the LOD weight of each chunk of a block, one thread each. The weight is 0 if the chunk holds no visible splat,
+// or is coarser or finer than the view requires.
 #import shared/chunk_visibility
 #import shared/detail
 #import shared/group
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> chunks: array<Chunk>;
-// Set to nothing, and the bits of chunks that are not drawn.
+// Cleared here, as are the bits of chunks that are not drawn.
 @group(0) @binding(2) var<storage, read_write> group_counts: array<u32>;
 @group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
-// Of pages with levels of detail.
+// Used by blocks that have levels of detail.
 @group(0) @binding(4) var<storage, read> details: array<ChunkDetail>;
-// The last word is no chunk's: pixels that a budget makes chunks be off.
+// The last word belongs to no chunk: it is the error threshold in pixels that a splat budget requires.
 @group(0) @binding(5) var<storage, read_write> chunk_shares: array<f32>;
 
 const CHUNK_THREADS = 64u;

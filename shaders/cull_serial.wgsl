@@ -1,4 +1,5 @@
-// `cull` for processors that run few threads one after the other: a thread looks at 32 splats, and none waits for another.
+// `cull` for software adapters, which run few threads sequentially: each thread tests 32 splats, and none waits for
+// another.
 #import shared/visibility
 #import shared/group
 #import shared/gathered
@@ -6,7 +7,7 @@
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
 @group(0) @binding(2) var<storage, read_write> visible_bits: array<u32>;
-// Nothing at first.
+// Cleared before this pass.
 @group(0) @binding(3) var<storage, read_write> group_counts: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> gathered: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> chunk_shares: array<f32>;

@@ -1,16 +1,16 @@
-// The least error that keeps the splats of a frame within a budget. Continuous in the counts: inside a bucket, whose count is an upper
-// bound for all of it, the place moves with how much of the budget is left.
+// Finds the lowest error threshold that keeps the splats of a frame within the budget. It is continuous in the counts:
+// a bucket's count is an upper bound for the whole bucket, so the position within it follows the remaining budget.
 #import shared/view
 #import shared/detail_counts
 #import shared/prefix
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> detail_counts: array<u32>;
-// Its last word is written.
+// Only its last word is written.
 @group(0) @binding(2) var<storage, read_write> chunk_shares: array<f32>;
 
 var<workgroup> looked_at: array<u32, DETAIL_BUCKETS>;
-// Number of the bucket behind the last that is over the budget.
+// Index of the bucket after the last one that exceeds the budget.
 var<workgroup> first_within: atomic<u32>;
 
 @compute @workgroup_size(PREFIX_THREADS)

@@ -1,4 +1,5 @@
-// For a budget: for which errors each chunk in view would be drawn. One thread for each chunk; sums of a workgroup go out together.
+// Counts, for a splat budget, the splats that would be drawn at each error threshold. One thread for each chunk; each
+// workgroup adds its sums to memory once.
 #import shared/chunk_visibility
 #import shared/detail
 #import shared/detail_counts
@@ -25,16 +26,16 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
 }
 
 fn count_chunk(chunk: u32) {
-  // Without levels a chunk is drawn whatever is allowed.
+  // A chunk without levels is drawn at every threshold.
   var own = 0.0;
   var above = 1e30;
   if (view.has_detail != 0u) {
     let d = details[chunk];
-    // While what is finer arrives, both are drawn.
+    // While finer chunks fade in, both levels are drawn.
     if (arrived_below(d) == ARRIVAL_STEPS) { own = screen_error(view, d.sphere, d.full_error); }
     above = screen_error(view, d.parent_sphere, d.parent_error) * exp2(view.detail_fade);
   }
-  // Places of a streamed scene that hold nothing have nothing above them.
+  // Empty slots of a streamed scene have no parent.
   if (own > above || above <= 0.0 || !may_be_visible(view, chunks[chunk])) { return; }
   let splats = min(CULL_GROUP, view.splat_count - chunk * CULL_GROUP);
   atomicAdd(&own_counts[bucket_of(own)], splats);

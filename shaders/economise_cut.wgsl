@@ -1,5 +1,5 @@
-// Applies a cut to a part of a scene: what goes becomes transparent, and splats of which fewer bands are kept take those that were set anew. The same choice
-// as `reduce` of `economise`.
+// Applies a cut to a block of a scene: removed splats become transparent, and splats that keep fewer bands take their
+// refitted coefficients. `reduce` of the package makes the same choice on the CPU.
 #import shared/transparent
 #import shared/sh
 #import shared/group
@@ -8,26 +8,26 @@
 struct Cut {
   splat_count: u32,
   sh_degree: u32,
-  // Splats below one of these go.
+  // Splats below either bound are removed.
   min_contribution: f32,
   removal_price: f32,
-  // Mean squared error that a coefficient is worth.
+  // Mean squared error that storing one coefficient is worth.
   colour_price: f32,
 }
 
 @group(0) @binding(0) var<uniform> cut: Cut;
 @group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
-// float16, two a word.
+// float16, two in each word.
 @group(0) @binding(2) var<storage, read> sh: array<u32>;
 @group(0) @binding(3) var<storage, read> scores: array<Score>;
 // See economise_lower.
 @group(0) @binding(4) var<storage, read> lowered: array<f32>;
 @group(0) @binding(5) var<storage, read_write> cut_gaussians: array<PackedGaussian>;
 @group(0) @binding(6) var<storage, read_write> cut_sh: array<u32>;
-// Splats that stay, by the degree that they keep.
+// Number of splats that stay, by the degree that they keep.
 @group(0) @binding(7) var<storage, read_write> kept: array<atomic<u32>, 4>;
 
-// For each splat the degree that it keeps, or GONE.
+// The degree that each splat keeps, or GONE.
 @group(0) @binding(8) var<storage, read_write> choices: array<u32>;
 
 const GONE = 4u;
@@ -38,7 +38,7 @@ fn coefficients(degree: u32) -> u32 {
   return (degree + 1u) * (degree + 1u);
 }
 
-// The degree at which error and the price of what is kept add up to least.
+// The degree that minimizes the error plus the price of the kept coefficients.
 fn degree_of(i: u32) -> u32 {
   var best = cut.sh_degree;
   if (cut.colour_price <= 0.0) { return best; }
@@ -53,13 +53,13 @@ fn degree_of(i: u32) -> u32 {
   return best;
 }
 
-// The nearest number that float16 holds, in its normal range: packing may cut off what it has no room for.
+// Rounds to the nearest float16 of the normal range, because packing is allowed to truncate.
 fn nearest_half(value: f32) -> f32 {
   let value_bits = bitcast<u32>(value);
   return bitcast<f32>((value_bits + 0xfffu + ((value_bits >> 13u) & 1u)) & 0xffffe000u);
 }
 
-// Number `n` of the coefficients of a lower degree, which begin at `first` and are so many.
+// Number `n` of the coefficients of a lower degree, which start at `first`; `numbers` is their count.
 fn lowered_number(first: u32, n: u32, numbers: u32) -> f32 {
   if (n >= numbers) { return 0.0; }
   return nearest_half(lowered[first + n]);

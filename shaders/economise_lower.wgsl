@@ -1,35 +1,36 @@
-// For each splat the coefficients of lower degrees that come nearest to the colours that the views saw, by least squares, and the error that is left:
-// see ColourMoments of `economise`, which does the same on the CPU. Also what its scores are once all views have been looked at.
+// Fits the coefficients of lower degrees of each splat to the colors that the views saw, by least squares, and finds
+// the remaining error: ColorMoments does the same on the CPU. Also finishes the scores once all views are rendered.
 #import shared/moments
 #import shared/group
 #import shared/score
 
 struct Lowering {
-  // Splats of the part, and from one row of `moments` to the next.
+  // Splats of the block, and the stride between rows of `moments`.
   splat_count: u32,
   row: u32,
   views: u32,
   sh_degree: u32,
-  // Mean squared error of a picture without a splat for each unit of its energy there.
+  // Mean squared error of an image without a splat, per unit of the splat's energy in it.
   contrast: f32,
-  // Views from everywhere that are imagined besides those that looked.
+  // Number of imagined views, spread over all directions, that are added to the real ones.
   prior_views: f32,
-  // Views that must have looked at a splat for it to be judged.
+  // Minimum of views that must contain a splat before it is scored.
   least_looks: u32,
 }
 
 @group(0) @binding(0) var<uniform> lowering: Lowering;
-// float16, two a word.
+// float16, two in each word.
 @group(0) @binding(1) var<storage, read> sh: array<u32>;
 @group(0) @binding(2) var<storage, read> moments: array<f32>;
 @group(0) @binding(3) var<storage, read_write> scores: array<Score>;
-// For each splat the errors of degrees 0 to sh_degree - 1, then the coefficients of degree 0, of degree 1 and of degree 2.
+// For each splat the errors of degrees 0 to sh_degree - 1, then the coefficients of degree 0, of degree 1 and of degree
+// 2.
 @group(0) @binding(4) var<storage, read_write> lowered: array<f32>;
 
 const PI = 3.14159265358979;
-// What stands for no bound: WGSL has no infinity.
+// Stands for "no bound", because WGSL has no infinity.
 const UNJUDGED = 3e38;
-// A direction that no view knows is left alone: its pivot is less than this part of the diagonal.
+// Directions that no view covers stay unchanged: their pivot is below this fraction of the diagonal.
 const LEAST_PIVOT = 1e-6;
 
 var<private> own: array<vec3f, MAX_COEFFICIENTS>;
@@ -48,7 +49,8 @@ fn load_coefficients(i: u32, size: u32) {
   }
 }
 
-// Cholesky's method in place, on the moments. One factor serves all degrees: that of the first coefficients is its beginning.
+// Cholesky factorization of the moments, in place. One factor serves all degrees, because the factor of the first
+// coefficients is its leading block.
 fn factorise(size: u32) {
   for (var row = 0u; row < size; row++) {
     for (var column = 0u; column <= row; column++) {
@@ -73,8 +75,8 @@ fn projected(column: u32, first: u32, size: u32) -> vec3f {
   return sum;
 }
 
-// Squared error, of all channels, that is left when the coefficients from `kept` on go and the others make up for it: what of them lies in the
-// factor's last columns. A sum of squares: nothing cancels.
+// Squared error, over all channels, that remains if the coefficients from `kept` on are dropped and the others
+// compensate: their part in the last columns of the factor. A sum of squares, so nothing cancels.
 fn squares_left(kept: u32, size: u32) -> f32 {
   var squares = 0.0;
   for (var column = kept; column < size; column++) {
@@ -84,7 +86,7 @@ fn squares_left(kept: u32, size: u32) -> f32 {
   return squares;
 }
 
-// What is best added to the first coefficients when those from `kept` on go.
+// Finds the best correction of the first coefficients if those from `kept` on are dropped.
 fn find_shift(kept: u32, size: u32) {
   for (var step = 0u; step < kept; step++) {
     let row = kept - 1u - step;
@@ -95,7 +97,7 @@ fn find_shift(kept: u32, size: u32) {
   }
 }
 
-// Of a splat that too few views looked at it is not known what its colours are worth.
+// Color errors of a splat that too few views contain are unknown, so they stay unbounded.
 fn lower(i: u32, degree: u32, size: u32, energy: f32, is_judged: bool) {
   let kept = (degree + 1u) * (degree + 1u);
   var error = select(UNJUDGED, 0.0, is_judged);

@@ -1,4 +1,5 @@
-// Adds what some views saw to the moments of the splats of a part: the products of basis functions in the direction of each view, weighted by the energy there.
+// Adds some views to the moments of the splats of a block: products of basis functions in the direction of each view,
+// weighted by the energy of the splat in it.
 #import shared/packed_gaussian
 #import shared/moments
 #import shared/group
@@ -6,16 +7,16 @@
 
 struct MomentViews {
   splat_count: u32,
-  // From one row of `energies` or `moments` to the next.
+  // Stride between rows of `energies` or `moments`.
   row: u32,
-  // The views at hand: a row of `energies` for each, and the first of their eyes.
+  // The number of views in this batch, one row of `energies` each, and the index of their first eye.
   views: u32,
   first_view: u32,
   sh_degree: u32,
 }
 
 @group(0) @binding(0) var<uniform> seen: MomentViews;
-// Where the views look from, page-local.
+// Eyes of the views, in block-local coordinates.
 @group(0) @binding(1) var<storage, read> eyes: array<vec4f>;
 @group(0) @binding(2) var<storage, read> gaussians: array<PackedGaussian>;
 @group(0) @binding(3) var<storage, read> energies: array<f32>;

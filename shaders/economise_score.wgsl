@@ -1,5 +1,6 @@
-// Adds what a view told of the splats of a part, after the tiles have noted their largest weights in it: the energy of each, which is the sum of the
-// squares of its weights over the pixels of the picture, taken for those of an ellipse of that peak and of its size on the screen.
+// Adds one view to the scores of the splats of a block, from the largest weights that the tiles have recorded. The
+// energy of a splat is the sum of its squared weights over the pixels of the image; it is computed for an ellipse of
+// that peak and of the projected size.
 #import shared/projection
 #import shared/packed_gaussian
 #import shared/group
@@ -7,9 +8,9 @@
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
-// Largest weights in this view; zero again afterwards, for the next one.
+// Largest weights in this view; cleared afterwards for the next one.
 @group(0) @binding(2) var<storage, read_write> peaks: array<f32>;
-// The view's row.
+// The row of this view.
 @group(0) @binding(3) var<storage, read_write> energies: array<f32>;
 @group(0) @binding(4) var<storage, read_write> scores: array<Score>;
 

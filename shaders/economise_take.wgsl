@@ -1,9 +1,10 @@
-// Takes the coefficients of a lower degree of some splats of a part, one after another: those that were found for all degrees take as much as the scene does.
+// Copies the coefficients of a lower degree of some splats of a block into a dense list, because `lowered` holds all
+// degrees and is as large as the scene.
 #import shared/group
 #import shared/score
 
 struct Take {
-  // Numbers that are taken, all splats together, and of each splat.
+  // Numbers copied for all splats together, and for each splat.
   count: u32,
   width: u32,
   sh_degree: u32,
@@ -11,7 +12,7 @@ struct Take {
 }
 
 @group(0) @binding(0) var<uniform> take: Take;
-// Numbers of the splats within the part.
+// Indices of the splats within the block.
 @group(0) @binding(1) var<storage, read> splats: array<u32>;
 // See economise_lower.
 @group(0) @binding(2) var<storage, read> lowered: array<f32>;

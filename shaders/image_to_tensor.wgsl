@@ -1,23 +1,24 @@
 #import shared/group
 
-// A picture to a tensor [views,channels,height,width]: red, green, blue and perhaps alpha planes in 0..1, top row first. Where sizes differ each pixel is a mean
-// with triangular weights, as wide as a pixel's step (antialiased bilinear); what lies outside the picture does not count.
+// Converts an image to a tensor [views,channels,height,width]: red, green, blue and optional alpha planes in 0..1, top
+// row first. If sizes differ each pixel is a mean with triangular weights, as wide as the step between pixels
+// (antialiased bilinear); texels outside the image have no weight.
 @group(0) @binding(0) var<uniform> image: ImageToTensor;
 @group(0) @binding(1) var picture: texture_2d<f32>;
-// Float32, or two float16 to a word.
+// float32, or two float16 in each word.
 @group(0) @binding(2) var<storage, read_write> tensor: array<u32>;
 
 struct ImageToTensor {
-  // Left upper corner of the part that is taken, in pixels of the picture.
+  // Upper left corner of the source region, in pixels of the image.
   corner: vec2f,
-  // Pixels of the picture to one of the tensor, across and down.
+  // Pixels of the image for each pixel of the tensor, across and down.
   step: vec2f,
   // Width and height of the tensor.
   size: vec2u,
   is_half: u32,
   // 3, or 4 with alpha.
   channels: u32,
-  // Words of the tensor before this picture.
+  // Offset of this image in the tensor, in words.
   first_word: u32,
 }
 

@@ -1,32 +1,33 @@
-// Turns the tensors that one run of a generator wrote into a page of packed Gaussians: one thread for each row, and one
-// workgroup for each chunk, whose bounds it finds. Rows that do not live become splats that paint nothing; rows with a number
-// that cannot be used become zeros, which `cull` counts as unusable.
+// Packs the output tensors of one generator run into a block of Gaussians: one thread for each row, and one workgroup
+// for each chunk, whose bounds it computes. Rows beyond the count become transparent splats; rows with an unusable
+// value become zeros, which `cull` counts as unusable.
 #import shared/packed_gaussian
 #import shared/sh
 #import shared/written_gaussian
 #import shared/group
 
 struct Ingest {
-  // Rows that live in this run, as the generator counts them; any number may stand here.
+  // Live rows of this run, as the generator reports them; any value may occur.
   count: i32,
-  // Rows that the tensors have in this run.
+  // Rows of the tensors of this run.
   rows: u32,
-  // Rows for which the page has room, and the number of its first among all rows.
+  // Capacity of the block in rows, and the index of its first row among all rows.
   page_rows: u32,
   first_row: u32,
-  // 1 for float16 tensors, which are read as integers: no device feature is needed.
+  // 1 for float16 tensors, which are read as integers, so that no device feature is required.
   is_half: u32,
-  // What `shape` holds: one of SHAPE_*, in so many numbers: 6 of a covariance, or the 9 of a matrix; 3 of scales, or 1 for all axes.
+  // Kind of `shape`, one of SHAPE_*, and its numbers in each row: 6 of a covariance, or the 9 of a matrix; 3 of scales,
+  // or 1 for all axes.
   shape_kind: u32,
   shape_numbers: u32,
-  // What `colors` holds: one of COLOR_*.
+  // Kind of `colors`, one of COLOR_*.
   color_kind: u32,
   sh_degree: u32,
   // 1 for quaternions in the order w, x, y, z; 0 for x, y, z, w.
   is_w_first: u32,
   // 1 for opacities before the sigmoid.
   is_logit: u32,
-  // Where each attribute lies: elements before it in a row, and elements of a row.
+  // Layout of each attribute: its offset in a row, and the length of the row, in elements.
   positions: vec2u,
   shapes: vec2u,
   rotations: vec2u,
@@ -42,7 +43,7 @@ const COLOR_COEFFICIENT_MAJOR = 1u;
 const COLOR_CHANNEL_MAJOR = 2u;
 
 @group(0) @binding(0) var<uniform> ingest: Ingest;
-// The tensors' parts that belong to the page, as 32-bit words. One tensor may stand in several places.
+// The regions of the tensors that belong to the block, as 32-bit words. One tensor may be bound several times.
 @group(0) @binding(1) var<storage, read> positions: array<u32>;
 // Covariances, or scales.
 @group(0) @binding(2) var<storage, read> shapes: array<u32>;
@@ -73,7 +74,8 @@ fn tensor_word(tensor: u32, word: u32) -> u32 {
   }
 }
 
-// The float32 bits of a float16, subnormal numbers, infinities and NaN included: `unpack2x16float` may lose all three.
+// Expands a float16 to the bits of a float32, including subnormal numbers, infinities and NaN: `unpack2x16float` may
+// lose all three.
 fn widen(half: u32) -> u32 {
   let sign = (half & 0x8000u) << 16u;
   let magnitude = half & 0x7fffu;
@@ -99,8 +101,8 @@ fn are_finite(words: vec3u) -> bool {
   return has_finite_bits(vec4u(words, 0u));
 }
 
-// Cholesky's factor. Needles and discs have pivots that are mere rounding, or even negative: no number may then exceed what the
-// diagonal allows, so that L Lᵀ keeps the diagonal and is off by no more than the rounding was.
+// Cholesky factor. Pivots of needles and discs may be pure rounding error, or even negative. No number may then exceed
+// the limit that the diagonal implies, so that L Lᵀ keeps the diagonal and is off by no more than the rounding error.
 fn factor_of_covariance(row: u32) -> Factor {
   let first = triple_of(SHAPES, ingest.shapes, row, 0u);
   var last = triple_of(SHAPES, ingest.shapes, row, select(3u, 4u, ingest.shape_numbers == 9u));
@@ -120,8 +122,8 @@ fn factor_of_covariance(row: u32) -> Factor {
   return Factor(vec3f(xx, yx, zx), vec2f(yy, zy), sqrt(max(rest - zy * zy, 0.0)), true);
 }
 
-// The same from the axes themselves: the rows of R S made orthogonal one after the other, as pack/factor.ts of the renderer does
-// it, so that needles keep the digits that a covariance would lose.
+// The same from rotation and scales: the rows of R S are orthogonalized one after the other, as in pack/factor.ts of
+// the renderer, so that needles keep the digits that a covariance would lose.
 fn factor_of_axes(row: u32) -> Factor {
   var scale_bits = vec3u(bits_of(SHAPES, ingest.shapes, row, 0u));
   if (ingest.shape_numbers == 3u) { scale_bits = triple_of(SHAPES, ingest.shapes, row, 0u); }
@@ -154,7 +156,7 @@ fn opacity_of(row: u32) -> Opacity {
   return Opacity(1.0 / (1.0 + exp(-logit)), true);
 }
 
-// Bits of number k of a row's harmonics in the order [coefficient][channel].
+// Bits of number k of the harmonics of a row, in the order [coefficient][channel].
 fn harmonic(row: u32, k: u32, coefficients: u32) -> u32 {
   switch ingest.color_kind {
     case COLOR_RGB: {
@@ -184,7 +186,7 @@ fn pack_harmonics(row: u32) -> bool {
   return usable;
 }
 
-// Packs a row that lives and notes its bounds.
+// Packs a live row and records its bounds.
 fn ingest_row(row: u32, lane: u32) -> PackedGaussian {
   let nothing = PackedGaussian(vec4u(0u), vec4u(0u));
   let position = triple_of(POSITIONS, ingest.positions, row, 0u);
@@ -213,6 +215,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     }
   }
   let bounds = chunk_of_group(lane);
-  // Rows without a chunk may be threads of the last row of workgroups.
+  // The last row of workgroups may have threads beyond the last chunk.
   if (lane == 0u && chunk * CULL_GROUP < ingest.page_rows) { chunks[chunk] = bounds; }
 }

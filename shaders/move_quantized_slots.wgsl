@@ -1,4 +1,5 @@
-// `move_slots` for the geometry of shared/quantized_gaussian: where a chunk's coordinates begin is all that moves. A thread a chunk.
+// `move_slots` for the geometry of shared/quantized_gaussian: only the origins of the chunks move. One thread for each
+// chunk.
 #import shared/quantized_layout
 #import shared/slot_move
 

@@ -1,4 +1,5 @@
-// Moves the splats of slots that were filled from a file which serves several places: of each slot those of one workgroup.
+// Translates the splats of slots that hold another instance of the same file. Each workgroup moves its splats of every
+// slot.
 #import shared/packed_gaussian
 #import shared/group
 #import shared/slot_move

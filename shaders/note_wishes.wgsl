@@ -1,5 +1,5 @@
-// Which pages of a streamed scene the view asks for, or will ask for when they have come, whether they are there or not: those of chunks that are off by
-// more than is allowed. One thread for each chunk; not in every frame.
+// Records which pages of a streamed scene the view needs, resident or not, now or once their parents have arrived:
+// those below chunks whose error exceeds the threshold. One thread for each chunk; does not run in every frame.
 #import shared/chunk_visibility
 #import shared/detail
 #import shared/group
@@ -8,26 +8,28 @@
 @group(0) @binding(1) var<storage, read> chunks: array<Chunk>;
 @group(0) @binding(2) var<storage, read> details: array<ChunkDetail>;
 @group(0) @binding(3) var<storage, read> chunk_shares: array<f32>;
-// For each streamed page the bits of the pixels that doing without it costs, or 0. The first page is always there: in its place the most that the view lacks.
+// For each streamed page the error in pixels of a missing page, as float32 bits, or 0. The first page is always
+// resident: its entry holds the largest error of the view.
 @group(0) @binding(4) var<storage, read_write> wishes: array<atomic<u32>>;
-// Where the camera will be: the columns of `local_to_camera`, and the eye.
+// The predicted camera: the columns of `local_to_camera`, and the eye.
 @group(0) @binding(5) var<uniform> ahead: array<vec4f, 5>;
 
 const WISH_THREADS = 64u;
-// How much less a page out of view is wished for, within a picture that is NEARBY_SIZE times as wide and high and beyond: a camera that turns, or that goes elsewhere than was
-// thought, finds it there.
+// Factors of the error of pages outside the view: NEARBY within an image NEARBY_SIZE times as wide and high, UNSEEN
+// beyond. A camera that turns or moves unexpectedly then finds them resident.
 const NEARBY = 0.25;
 const NEARBY_SIZE = 2.0;
 const UNSEEN = 0.0625;
 
-// Share of the pixels that are allowed from which on a page is wished for, though nothing of it is drawn yet: the view lacks it soon.
+// A page is already requested at this fraction of the error threshold, because the view will need it soon.
 const SOON = 0.93;
 
-// Share of the pixels that a budget allows down to which a page that is there is still wished for. A page that comes takes of the budget, so more is allowed: with one bound it would
-// be wished for no more, leave, and be wished for again. Half an octave is four of the steps in which a budget is found.
+// A resident page is still requested down to this fraction of the budget's error threshold. A new page uses part of the
+// budget, which raises the threshold: with a single bound it would be dropped, evicted and requested again. Half an
+// octave is four of the steps that find the threshold.
 const KEPT = 0.7;
 
-// Pixels that doing without what is finer costs a view, from so many of them on.
+// Screen error of a missing page in pixels, or 0 if it is at most `least`.
 fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -> f32 {
   let pixels = screen_error(seen, d.sphere, d.full_error);
   if (pixels <= least && refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
@@ -35,7 +37,7 @@ fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -
   return select(UNSEEN, NEARBY, may_be_visible(nearby(seen), chunk)) * pixels;
 }
 
-// The view with a wider picture around the same middle.
+// The view with a wider image around the same center.
 fn nearby(seen: View) -> View {
   var wider = seen;
   wider.viewport *= NEARBY_SIZE;

@@ -1,10 +1,11 @@
-// How far a picture is from another one: squared differences of the three colours, over the pixels that the other covers, summed for each tile.
+// Compares an image with a reference: squared differences of the three colors, over the pixels that the reference
+// covers, summed for each tile.
 #import shared/picture_sums
 
 // Premultiplied red, green, blue and alpha.
 @group(0) @binding(0) var image: texture_2d<f32>;
 @group(0) @binding(1) var reference: texture_2d<f32>;
-// A sum and the number of covered pixels for each tile, row by row.
+// Sum of squares and number of covered pixels for each tile, row by row.
 @group(0) @binding(2) var<storage, read_write> tiles: array<vec2f>;
 
 const ERROR_TILE = 16u;

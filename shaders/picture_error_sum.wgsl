@@ -1,14 +1,14 @@
-// Adds up what `picture_error` found in the tiles of several pictures, one workgroup a picture.
+// Adds up the tiles of several images from the first pass, one workgroup for each image.
 #import shared/picture_sums
 
 struct PictureErrors {
-  // Tiles for which there is room in each picture; those that a picture lacks are zero.
+  // Capacity in tiles of each image; unused tiles are zero.
   tiles: u32,
 }
 
 @group(0) @binding(0) var<uniform> pictures: PictureErrors;
 @group(0) @binding(1) var<storage, read> tiles: array<vec2f>;
-// A sum and the number of covered pixels for each picture.
+// Sum of squares and number of covered pixels for each image.
 @group(0) @binding(2) var<storage, read_write> errors: array<vec2f>;
 
 @compute @workgroup_size(SUM_THREADS)

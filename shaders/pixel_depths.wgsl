@@ -1,4 +1,5 @@
-// For the survivors of a page: how their depth differs from pixel to pixel; and other depth keys. Runs between `project` and the sort.
+// Computes how the depth of each survivor of a block changes from pixel to pixel, and replaces its depth key. Runs
+// between `project` and the sort.
 #import shared/projection
 #import shared/stored_gaussian
 #import shared/gathered
@@ -15,11 +16,11 @@
 @group(0) @binding(5) var<storage, read_write> pixel_depths: array<PixelDepth>;
 @group(0) @binding(6) var<storage, read_write> keys: array<u32>;
 
-// Standard deviations of its depth over the screen by which a splat is listed before its centre: one that comes too late for a pixel's window
-// is blended too late, one that comes too early waits in it.
+// A splat is listed ahead of its center by this many standard deviations of its depth over the screen. A splat that
+// comes too late for a pixel's window is blended too late; one that comes too early waits in the window.
 const AHEAD = 0.5;
 
-// As `depth_key` of `project`, of depths that may lie before the nearest centre.
+// Same as `depth_key` of `project`, for depths that may lie in front of the nearest center.
 fn ahead_key(depth: f32) -> u32 {
   let depth_bits = bitcast<u32>(max(depth, 0.0));
   if (view.key_bits == 32u) { return depth_bits; }

@@ -1,4 +1,4 @@
-// Sums up the survivors of each group, or of each block of an order, and tells the stages that follow how many there are.
+// Prefix sums of the survivors of each group, or of each block of the sort, and the counts for the stages that follow.
 #import shared/scan
 #import shared/plan_counts
 

@@ -1,4 +1,5 @@
-// `plan` for processors that run few threads one after the other: a single thread, and no barriers, which such processors take long to compile.
+// `plan` for software adapters, which run few threads sequentially: a single thread without barriers, which take such
+// adapters long to compile.
 #import shared/saturating
 #import shared/plan_counts
 

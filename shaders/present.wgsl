@@ -1,9 +1,9 @@
-// Copies a picture to a target of the same size and any renderable colour format.
+// Copies an image to a target of the same size and any renderable color format.
 @group(0) @binding(0) var picture: texture_2d<f32>;
 
 @vertex
 fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-  // One triangle that covers the image.
+  // One triangle covers the image.
   return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 

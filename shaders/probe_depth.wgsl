@@ -1,5 +1,5 @@
-// What lies under single points of the last frame: picking, and labels that scenery hides. One workgroup a point; each
-// lane walks one run of the splats, from near to far, so that a prefix product of 64 runs is all that is left to join.
+// Finds the splats under single points of the last frame, for picking and for the occlusion of labels. One workgroup
+// for each point; each lane walks one run of the splats, from near to far, and a prefix product joins the 64 runs.
 #import shared/probe
 #import shared/probe_answer
 #import shared/plan
@@ -41,7 +41,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   answers[workgroup_id.x] = answer;
 }
 
-// The first splat, from near to far, behind which less than a share of the light is left.
+// The first splat, from near to far, behind which less than a fraction of the light is left.
 fn find(answer: ptr<function, ProbeAnswer>, point: ProbePoint, level: u32, length: u32) {
   let share = light_left(level);
   var total = 1.0;

@@ -1,5 +1,6 @@
-// The depths that `probe_depth` has found, of splats' centers, become those at which the splats are densest along the rays of the points: the surface that a
-// person sees. One page of Gaussians at a time, whose survivors are listed again: the sort has overwritten the list.
+// Replaces the depths of splat centers, found by `probe_depth`, by the densest depths along the rays: the visible
+// surface. Runs for one block of Gaussians at a time and lists its survivors again, because the sort has overwritten
+// the list.
 #import shared/densest
 #import shared/stored_gaussian
 #import shared/plan

@@ -1,4 +1,4 @@
-// Projects the survivors of a page: screen ellipse, colour from spherical harmonics, and the depth key of the sort.
+// Projects the survivors of a block: screen ellipse, color from spherical harmonics, and the depth key of the sort.
 #import shared/projection
 #import shared/stored_gaussian
 #import shared/sh_color
@@ -24,19 +24,20 @@ fn sh_word(i: u32) -> vec2u {
   return sh[i];
 }
 
-// Orders as the depth does. The bits of a positive float32, read as a number, grow like its logarithm: a share of the
-// visible range of that number is a logarithmic key that needs no logarithm.
+// Monotonic in the depth. The bits of a positive float32, read as an integer, grow like its logarithm, so their
+// fraction of the visible range is a logarithmic key without a logarithm.
 fn depth_key(depth: f32) -> u32 {
   let depth_bits = bitcast<u32>(depth);
   if (view.key_bits >= 32u) { return depth_bits; }
   let nearest = ~gathered[NEAREST_INVERTED];
   let range = f32(max(gathered[FARTHEST] - nearest, 1u));
-  // A depth computed anew may lie a rounding before the nearest one.
+  // A recomputed depth may round to less than the nearest one.
   let share = f32(max(depth_bits, nearest) - nearest) / range;
   return u32(min(share, 1.0) * f32((1u << view.key_bits) - 1u));
 }
 
-// Where the splats cover the image more often than they may, those are left out that take more than their equal part: the rest stays within the limit.
+// If the splats cover the image more often than the limit allows, drops those that cover more than an equal portion, so
+// that the rest stays within the limit.
 fn is_left_out(e: Ellipse) -> bool {
   if (gathered[COVERED] <= view.most_covered) { return false; }
   let part = f32(COVERED_UNIT) * f32(view.most_covered) / f32(max(plan.visible, 1u));

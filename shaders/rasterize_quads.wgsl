@@ -1,4 +1,4 @@
-// Draws quads of splats alone.
+// Draws quads of splats in a scene without meshes.
 #import shared/quads
 #import shared/plain_quad
 

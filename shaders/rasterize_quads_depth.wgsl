@@ -1,4 +1,5 @@
-// Draws quads with what else is in the picture. Splats behind it are left out, pixel by pixel; with layers, those that are not behind `part` of them.
+// Draws quads in a scene with meshes. Splats behind the depth of a mesh are discarded pixel by pixel; with layers,
+// those that are not behind `part` layers.
 #import shared/scene_depth
 #import shared/quads
 
@@ -39,6 +40,6 @@ fn fragment(quad: DeepQuad) -> @location(0) vec4f {
   let offset = quad.position.xy - quad.shape.xy;
   let alpha = alpha_at(offset, quad.shape.z, quad.shape.w, quad.inverse_sigma_v, quad.color.a);
   if (alpha < ALPHA_MIN) { discard; }
-  // Blended as colour = alpha · color + (1 - alpha) · colour and transmittance = (1 - alpha) · transmittance.
+  // Blended as color = alpha · color + (1 - alpha) · color behind, and transmittance = (1 - alpha) · transmittance.
   return vec4f(quad.color.rgb * alpha, alpha);
 }

@@ -1,4 +1,4 @@
-// Paints tiles and notes nothing.
+// Rasterizes tiles without auxiliary outputs.
 #import shared/paint_columns
 
 fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {}

@@ -1,17 +1,17 @@
-// Paints tiles, and notes what each splat contributed and how deep each pixel is.
+// Rasterizes tiles, and writes the contribution of each splat and the depth of each pixel.
 #import shared/paint_columns
 #import shared/median_depth
 
-// Numbers of the splats by slot.
+// Indices of the splats by slot.
 @group(0) @binding(7) var<storage, read> survivors: array<u32>;
-// By number: bits of the largest weight, alpha times transmittance, that the splat has had in any pixel of any frame.
+// Index is that of the splat: bits of its largest weight, alpha times transmittance, in any pixel of any frame.
 @group(0) @binding(8) var<storage, read_write> contributions: array<atomic<u32>>;
-// Camera depth, in world units, of the splat that leaves a pixel half transparent or less; 0 where none does.
+// Camera depth, in world units, of the splat that reduces the transmittance of a pixel to half or less; 0 if none does.
 @group(0) @binding(9) var depths: texture_storage_2d<r32float, write>;
 
 // Slots of the splats of the batch.
 var<workgroup> slots: array<u32, BATCH>;
-// Largest weight of each splat of the batch, and of the one that stands for a missing one.
+// Largest weight of each splat of the batch, and of the placeholder for missing ones.
 var<workgroup> weights: array<atomic<u32>, BATCH + 1u>;
 
 fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {

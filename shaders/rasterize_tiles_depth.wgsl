@@ -1,4 +1,5 @@
-// Paints tiles with meshes in the scene, which end pixels or are layers of them; and writes the depth of the splats.
+// Rasterizes tiles in a scene with meshes, which end pixels or are blended as layers; also writes the depth of the
+// splats.
 #import shared/scene_depth
 #import shared/paint_columns
 #import shared/median_depth
@@ -7,7 +8,7 @@
 // Camera depths by slot.
 @group(0) @binding(8) var<storage, read> depths: array<f32>;
 @group(0) @binding(9) var stored_depth: texture_2d<f32>;
-// Receives the depth at which half of the light is gone; 0 where more passes.
+// Receives the depth that halves the transmittance; 0 if more light passes.
 @group(0) @binding(10) var median_depth: texture_storage_2d<r32float, write>;
 @group(0) @binding(11) var layer_color: texture_2d<f32>;
 @group(0) @binding(12) var second_depth: texture_2d<f32>;
@@ -16,7 +17,8 @@
 override tests_depth: bool = true;
 override tells_depth: bool = false;
 
-// Of a thread's pixels: the topmost, the depth of the next layer, and the layers that are blended.
+// State of a thread's pixels: the topmost one, the depth of the next layer of each, and their numbers of blended
+// layers.
 var<private> topmost: vec2u;
 var<private> limits: Column;
 var<private> passed: vec4u;
@@ -47,7 +49,8 @@ fn blend_layer(pixels: ptr<function, Pixels>, row: u32) {
   (*pixels).transmittance[row] = (*pixels).light[row];
 }
 
-// Before splat k of the batch: layers that are nearer come first. A depth without a layer leaves no light for what is behind it.
+// Runs before splat k of the batch, because nearer layers come first. A depth without a color layer blocks all light
+// from behind.
 fn hide(pixels: ptr<function, Pixels>, k: u32) {
   if (!tests_depth) { return; }
   let is_behind = Column(batch_depths[k]) > limits;

@@ -1,6 +1,7 @@
-// Paints tiles in an order of each pixel's own: by where along its ray a splat is densest (shared/pixel_depth). Splats come in the order of the tile's list. A pixel keeps
-// a window of the last ones that reach it, sorted, and blends what the next ones push out at its near end: the order is exact as long as none comes later than
-// the window is long.
+// Rasterizes tiles with the order of each pixel: by the densest depth of a splat along its ray (shared/pixel_depth).
+// Splats come in the order of the tile's list. A pixel keeps a sorted window of the last splats that reach it, and
+// blends the nearest ones when new ones push them out. The order is exact as long as no splat comes later than the
+// window is long.
 #import shared/scene_depth
 #import shared/pixel_depth
 #import shared/gathered
@@ -10,7 +11,7 @@
 @group(0) @binding(8) var<storage, read> gathered: array<u32>;
 @group(0) @binding(9) var<uniform> scene: SceneDepth;
 @group(0) @binding(10) var stored_depth: texture_2d<f32>;
-// Receives the depth at which half of the light is gone; 0 where more passes.
+// Receives the depth that halves the transmittance; 0 if more light passes.
 @group(0) @binding(11) var median_depth: texture_storage_2d<r32float, write>;
 @group(0) @binding(12) var layer_color: texture_2d<f32>;
 @group(0) @binding(13) var second_depth: texture_2d<f32>;
@@ -21,43 +22,44 @@ const COLUMN: u32 = 1u;
 
 override tests_depth: bool = false;
 override tells_depth: bool = false;
-// Rays that are all parallel.
+// True for parallel rays.
 override is_parallel: bool = false;
-// A window of 32 splats instead of 16.
+// True for a window of 32 splats instead of 16.
 override is_wide: bool = false;
 
 struct Pixel {
   color: vec3f,
   transmittance: f32,
-  // Transmittance to which no splat may take the pixel, or behind which none is blended; once that has come, or there is nothing to paint, FINISHED.
+  // No splat may reduce the transmittance to this value, or none is blended behind it; FINISHED once it is reached, or
+  // if the pixel has nothing to draw.
   least: f32,
 }
 alias Pixels = Pixel;
 
-// No splat leaves more.
+// Larger than any transmittance.
 const FINISHED = 2.0;
 
-// 2 ln 2: r² of u² + v² in the axes of a batch.
+// 2 ln 2: converts to r² from u² + v² in the axes of a batch.
 const RADIUS_2 = 1.3862943611198906;
 // Least 1 / depth.
 const NEARNESS_MIN = 1e-30;
 
-// Of the splats of the batch, and of the one that takes the place of a missing one: 1 / depth (depth, where rays are parallel) at the tile's corner, and by which it grows
-// across and down.
+// For the splats of the batch and the placeholder: 1 / depth (depth itself, if rays are parallel) at the corner of the
+// tile, and its gradient across and down.
 var<workgroup> nearness: array<f32, BATCH + 1u>;
 var<workgroup> slopes: array<vec2f, BATCH + 1u>;
 
-// Depth from which steps are counted, as the bits of a float32, and the bits of such a number that a step leaves out.
+// First depth of the steps, as float32 bits, and the number of low bits that one step covers.
 var<private> first_depth: u32;
 var<private> step_bits: u32;
-// Depth of the next layer, layers that are blended, and the texel of all of them.
+// Depth of the next layer, number of blended layers, and the texel of all of them.
 var<private> limit: f32;
 var<private> passed: u32;
 var<private> own_texel: vec2u;
 var<private> half_depth: f32;
 
-// Four splats of a pixel. Of each: its depth in 20 bits above its alpha in 12, 0 where there is none, so that nothing comes before everything else; and its colour, three numbers
-// of 9 bits with an exponent in common.
+// Four splats of a pixel. `key` has the depth in 20 bits above the alpha in 12, and is 0 for an empty place, so that it
+// sorts first. `color` has three 9-bit mantissas with a shared exponent.
 struct Four {
   key: vec4u,
   color: vec4u,
@@ -68,7 +70,7 @@ const ALPHA_MASK = (1u << ALPHA_BITS) - 1u;
 const DEPTH_BITS = 20u;
 const DEPTH_MASK = (1u << DEPTH_BITS) - 1u;
 
-// The window: near to far. The second half is that of wide ones.
+// The window, from near to far. The second half is used only by wide windows.
 var<private> window_0: Four;
 var<private> window_1: Four;
 var<private> window_2: Four;
@@ -78,7 +80,8 @@ var<private> window_5: Four;
 var<private> window_6: Four;
 var<private> window_7: Four;
 
-// Adding 2^23 to a whole number below it leaves the number in the lowest bits; conversions take a GPU four times as long.
+// Adding 2^23 to a smaller integer leaves it in the lowest bits of the float; conversions take a GPU four times as
+// long.
 const WHOLE = 8388608.0;
 const WHOLE_BITS = 0x4b000000u;
 
@@ -87,7 +90,7 @@ fn number(bits: u32) -> f32 { return bitcast<f32>(bits | WHOLE_BITS) - WHOLE; }
 
 fn shared_exponent(color: vec3f) -> u32 {
   let most = bitcast<u32>(max(max(color.r, color.g), max(color.b, 0x1p-16)));
-  // The exponent of what the largest is rounded to: 2^(exponent - 15) is more than that.
+  // Rounded first, so that 2^(exponent - 15) exceeds the largest channel.
   let exponent = ((most + 0x4000u) >> 23u) - 111u;
   let steps = color * bitcast<f32>((151u - exponent) << 23u);
   return whole(steps.r) | (whole(steps.g) << 9u) | (whole(steps.b) << 18u) | (exponent << 27u);
@@ -98,7 +101,7 @@ fn shared_exponent_color(bits: u32) -> vec3f {
   return steps * bitcast<f32>(((bits >> 27u) + 103u) << 23u);
 }
 
-// The color, and how the splat bends, in the axes of the batch.
+// The color, and the bend of the splat's depth, in the axes of the batch.
 fn packed_color(s: ProjectedSplat, slot: u32) -> vec2u {
   return vec2u(shared_exponent(splat_color(s)), bitcast<u32>(RADIUS_2 * pixel_depths[slot].bend));
 }
@@ -130,7 +133,7 @@ fn depth_of(key: u32) -> f32 {
   return bitcast<f32>(first_depth + ((key >> ALPHA_BITS) << step_bits));
 }
 
-// Splat k of the batch at a pixel.
+// Key and color of splat k of the batch at a pixel.
 fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
   let axis = axes[k];
   let paint = paints[k];
@@ -141,7 +144,7 @@ fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
   let slope = slopes[k];
   let linear = nearness[k] + (slope.x * place.x + slope.y * place.y);
   var depth = max(linear, 0.0);
-  // Behind the camera nothing is densest: then the splat surrounds it.
+  // Behind the camera there is no densest point: the splat then surrounds the camera.
   if (!is_parallel) { depth = select(max(1.0 - bitcast<f32>(paint.w) * radius_2, 0.0) / max(linear, NEARNESS_MIN), 0.0, linear <= 0.0); }
   let steps = min((max(bitcast<u32>(depth), first_depth) - first_depth) >> step_bits, DEPTH_MASK);
   let alpha = min(ALPHA_MAX, exp2(power));
@@ -150,7 +153,7 @@ fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
   return vec2u(select(0u, key, is_seen), paint.z);
 }
 
-// Puts pairs in order, four at once: the nearer of each into the first.
+// Orders four pairs at once: the nearer splat of each goes into the first.
 fn put_in_order(near: ptr<function, Four>, far: ptr<function, Four>) {
   let a = *near;
   let b = *far;
@@ -159,10 +162,10 @@ fn put_in_order(near: ptr<function, Four>, far: ptr<function, Four>) {
   *far = Four(max(a.key, b.key), select(b.color, a.color, swaps));
 }
 
-// Behind all others.
+// Sorts behind all others.
 const LAST = Four(vec4u(0xffffffffu), vec4u(0u));
 
-// Of twelve, those of places 2 and 4, 3 and 5, 6 and 8, 7 and 9.
+// Compares places 2 and 4, 3 and 5, 6 and 8, 7 and 9 of twelve.
 fn order_two_apart(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<function, Four>) {
   var near = Four(vec4u((*p).key.zw, (*q).key.zw), vec4u((*p).color.zw, (*q).color.zw));
   var far = Four(vec4u((*q).key.xy, (*r).key.xy), vec4u((*q).color.xy, (*r).color.xy));
@@ -172,7 +175,7 @@ fn order_two_apart(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<functi
   *r = Four(vec4u(far.key.zw, (*r).key.zw), vec4u(far.color.zw, (*r).color.zw));
 }
 
-// Of twelve, those of places 1 and 2, 3 and 4, 5 and 6, 7 and 8.
+// Compares places 1 and 2, 3 and 4, 5 and 6, 7 and 8 of twelve.
 fn order_neighbours(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<function, Four>) {
   var near = Four(vec4u((*p).key.yw, (*q).key.yw), vec4u((*p).color.yw, (*q).color.yw));
   var far = Four(
@@ -184,10 +187,10 @@ fn order_neighbours(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<funct
   *r = Four(vec4u(far.key.w, (*r).key.yzw), vec4u(far.color.w, (*r).color.yzw));
 }
 
-// Eight splats in any order become eight in order, by Batcher's odd-even merges (1968): 19 pairs.
+// Sorts eight splats by Batcher's odd-even merge sort (1968): 19 comparisons.
 fn sort_eight(p: ptr<function, Four>, q: ptr<function, Four>) {
   put_in_order(p, q);
-  // Pairs of pairs.
+  // Sorts pairs of pairs.
   var a = Four(
     vec4u((*p).key.x, (*q).key.x, (*p).key.z, (*q).key.z), vec4u((*p).color.x, (*q).color.x, (*p).color.z, (*q).color.z),
   );
@@ -195,7 +198,7 @@ fn sort_eight(p: ptr<function, Four>, q: ptr<function, Four>) {
     vec4u((*p).key.y, (*q).key.y, (*p).key.w, (*q).key.w), vec4u((*p).color.y, (*q).color.y, (*p).color.w, (*q).color.w),
   );
   put_in_order(&a, &b);
-  // Of each four the least and the greatest are known, and which two lie between.
+  // The first and the last of each four are final; the two between them are compared.
   var c = Four(vec4u(a.key.yw, 0u, 0u), vec4u(a.color.yw, 0u, 0u));
   var d = Four(vec4u(b.key.xz, 0u, 0u), vec4u(b.color.xz, 0u, 0u));
   put_in_order(&c, &d);
@@ -207,7 +210,8 @@ fn sort_eight(p: ptr<function, Four>, q: ptr<function, Four>) {
   order_neighbours(p, q, &last);
 }
 
-// Eight splats in order go into sixteen in order: the nearest eight come out, in order. An odd-even merge of 45 pairs, as the eight were sixteen, half of them LAST.
+// Merges eight sorted splats into sixteen sorted ones; the nearest eight are returned in order. An odd-even merge of 45
+// comparisons, as if the eight were sixteen, half of them LAST.
 fn merge_into(
   p: ptr<function, Four>, q: ptr<function, Four>,
   w: ptr<private, Four>, x: ptr<private, Four>, y: ptr<private, Four>, z: ptr<private, Four>,
@@ -267,7 +271,7 @@ fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
 }
 
 fn blend_four(pixel: ptr<function, Pixel>, four: Four) {
-  // None comes before all others.
+  // Empty places sort before all others.
   if (four.key.w == 0u) { return; }
   blend_one(pixel, four.key.x, four.color.x);
   blend_one(pixel, four.key.y, four.color.y);
@@ -275,7 +279,7 @@ fn blend_four(pixel: ptr<function, Pixel>, four: Four) {
   blend_one(pixel, four.key.w, four.color.w);
 }
 
-// The splats of the batch that touch a block, one after the other.
+// Iterates over the splats of the batch that touch a block.
 struct Walk {
   ahead: u32,
   next_word: u32,
@@ -313,7 +317,7 @@ fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, least_
     var p = next_four(&walk, own_block, place, least_power);
     var q = next_four(&walk, own_block, place, least_power);
     sort_eight(&p, &q);
-    // What leaves the window at its near end leaves it in order; what comes goes to its place.
+    // Splats leave the window sorted at its near end; new ones are inserted at their depth.
     merge_into(&p, &q, &window_0, &window_1, &window_2, &window_3);
     let leaving_p = p;
     let leaving_q = q;

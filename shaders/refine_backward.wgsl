@@ -1,7 +1,8 @@
-// From the pixels of a picture back to the splats that painted it: how the squared error to another picture changes with their colours and ellipses. One workgroup for each
-// patch of 16 x 16 pixels of a tile and one thread a pixel, front to back as the tiles were painted: what lies behind a splat is the finished colour without what was painted so far,
-// so that nothing need be kept. Derivatives are summed in fixed point, over the pixels of a patch and then over the patches: in whichever order they come, the sums are the same,
-// and none waits for another or tries again.
+// Backpropagates from the pixels of an image to the splats that were drawn: the derivatives of the squared error
+// against a reference by the colors and ellipses of the splats. One workgroup for each patch of 16 x 16 pixels of a
+// tile and one thread for each pixel, front to back as in the forward pass: the color behind a splat is the finished
+// color minus the accumulated one, so nothing is stored. Derivatives are summed in fixed point, over the pixels of a
+// patch and then over the patches, so the sums do not depend on the order, and no thread waits or retries.
 #import shared/tile_list
 #import shared/refined
 
@@ -10,16 +11,16 @@
 @group(0) @binding(6) var reference: texture_2d<f32>;
 // SCREEN_NUMBERS of each splat, two words each: see `of_fixed`.
 @group(0) @binding(7) var<storage, read_write> screen: array<atomic<i32>>;
-// Numbers of the splats by slot.
+// Indices of the splats by slot.
 @group(0) @binding(8) var<storage, read> survivors: array<u32>;
 
 // Side of a patch in pixels.
 const PATCH = 16u;
-// Splats of a batch.
+// Splats in each batch.
 const BACKWARD_BATCH = 128u;
-// Larger differences of a channel count as if they were so large: outliers must not lead.
+// Clamp of the difference of a channel, so that outliers do not dominate.
 const MOST_DIFFERENCE = 0.0625;
-// The largest number of steps that a pixel adds: 256 of them fit an i32.
+// Clamp of one pixel's number of steps: 256 of them fit an i32.
 const MOST_FIXED = 8388607.0;
 
 var<workgroup> slots: array<u32, BACKWARD_BATCH>;
@@ -33,7 +34,7 @@ fn add_fixed(k: u32, number: u32, value: f32) {
   atomicAdd(&sums[k * SCREEN_NUMBERS + number], i32(clamp(round(value * FIXED), -MOST_FIXED, MOST_FIXED)));
 }
 
-// What a patch has summed up: at most 65,536 of them fit.
+// Adds the sum of a patch; at most 65,536 of them fit.
 fn add_words(at: u32, sum: i32) {
   atomicAdd(&screen[2u * at], sum & 0xffff);
   atomicAdd(&screen[2u * at + 1u], sum >> 16u);
@@ -43,7 +44,7 @@ struct Pixel {
   place: vec2f,
   // Derivative of the squared error by each channel.
   slope: vec3f,
-  // What has not been painted yet.
+  // Color that is not yet drawn.
   behind: vec3f,
   transmittance: f32,
   is_finished: bool,
@@ -56,7 +57,7 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
   paints[k] = s.paint;
 }
 
-// As `blend` of paint_columns, and what the pixel tells of splat k of the batch.
+// Same as `blend` of paint_columns, and also adds the pixel's derivatives for splat k of the batch.
 fn unblend(pixel: ptr<function, Pixel>, k: u32) {
   let shape = shapes[k];
   let offset = (*pixel).place - shape.xy;
@@ -79,7 +80,7 @@ fn unblend(pixel: ptr<function, Pixel>, k: u32) {
   add_fixed(k, 1u, by_color.y);
   add_fixed(k, 2u, by_color.z);
   add_fixed(k, 9u, BEND_UNIT * weight * weight);
-  // One that is as opaque as may be does not become more so.
+  // The clamp of alpha has no derivative.
   if (own > ALPHA_MAX) { return; }
   let by_alpha = alpha * (before * color - (*pixel).behind / (1.0 - alpha));
   let q = dot((*pixel).slope, by_alpha);

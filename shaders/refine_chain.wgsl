@@ -1,5 +1,5 @@
-// From what a picture tells of the splats on its screen to the numbers that make them, by the chain rule: through EWA splatting (shared/projection) and the harmonics. That
-// colours turn as a splat moves is left out.
+// Propagates derivatives from the screen ellipses of the splats to their parameters by the chain rule: through EWA
+// splatting (shared/projection) and the harmonics. The change of color as a splat moves is neglected.
 #import shared/projection
 #import shared/sh
 #import shared/group
@@ -8,16 +8,16 @@
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> refine_view: RefineView;
 @group(0) @binding(2) var<storage, read> numbers: array<f32>;
-// For each splat the degree that it keeps.
+// The degree that each splat keeps.
 @group(0) @binding(3) var<storage, read> degrees: array<u32>;
-// SCREEN_NUMBERS of each splat, in fixed point; zero again afterwards, for the next view.
+// SCREEN_NUMBERS of each splat, in fixed point; cleared afterwards for the next view.
 @group(0) @binding(4) var<storage, read_write> screen: array<vec2i>;
 @group(0) @binding(5) var<storage, read_write> gradients: array<f32>;
-// Of each splat the largest curvatures in a view: see BEND_COLOUR.
+// The largest curvatures of each splat in any view: see BEND_COLOUR.
 @group(0) @binding(6) var<storage, read_write> bends: array<vec4f>;
 
-// A splat that has an eye within so many of its sizes is not moved. What a step costs there derivatives do not tell: that the near plane cuts off all of it at once, and that it passes
-// before or behind others in the order of depth.
+// A splat with an eye within this many of its sizes is not moved. Derivatives do not include the cost of a step there:
+// the near plane may clip the whole splat at once, and its depth order may change.
 const NEAR_SIZES = 64.0;
 const NO_MOVE = 1e30;
 const FOUR_PI = 12.566371;
@@ -43,7 +43,7 @@ fn chain_colour(i: u32, position: vec3f, by_color: vec3f) {
       color += basis[k % 4u] * vec3f(numbers[at], numbers[at + 1u], numbers[at + 2u]);
     }
   }
-  // Negative colours are black.
+  // Negative colors are clamped to black, so their derivative is 0.
   let used = select(vec3f(0.0), by_color, color > vec3f(0.0));
   for (var quartet = 0u; 4u * quartet < count; quartet++) {
     let basis = sh_basis(quartet, direction);
@@ -80,7 +80,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   p.z = max(p.z, view.near);
   let xy = p.xy / p.z;
   let t = clamp(xy, view.jacobian_min, view.jacobian_max);
-  // Columns are the axes of the splat as the camera sees them; `a` has the rows.
+  // Columns are the axes of the splat in camera space; `a` has the rows.
   let axes = mat3x3f(to_camera * own.axes[0] * own.scales.x, to_camera * own.axes[1] * own.scales.y, to_camera * own.axes[2] * own.scales.z);
   let a = transpose(axes);
   let focal = view.focal / p.z;
@@ -102,7 +102,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let m_y = x * seen[7] + lean * seen[8];
   var by_covariance = 0.5 * vec3f(x * m_x + lean * m_y, y * m_y, y * y * seen[8]);
   if (view.antialiased != 0u && bare_determinant > COMPENSATION_MIN * COMPENSATION_MIN * determinant) {
-    // The opacity grows with the root of the ratio of both determinants.
+    // The compensated opacity grows with the square root of the ratio of the determinants.
     by_covariance += 0.5 * seen[3] * (vec3f(bare.z, -bare.y, bare.x) / bare_determinant
       - vec3f(bare.z + view.filter_variance, -bare.y, variance_x) / determinant);
   }
@@ -117,7 +117,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let by_z = -(dot(row_x, by_row_x) + dot(row_y, by_row_y) + dot(by_xy, xy)) / p.z;
   let by_position = transpose(to_camera) * vec3f(by_xy / p.z, by_z);
   let stride = strides(own.scales);
-  // Rows to columns: by each axis of the splat, in the scene.
+  // Transposes rows to columns: by each axis of the splat, in the scene.
   let by_axes = transpose(mat3x3f(by_a0, by_a1, by_a2));
   var turns: array<vec3f, 3>;
   var most_shift = 0.0;
@@ -125,7 +125,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let shift = to_camera * own.axes[k] * stride[k] / p.z;
     let on_screen = (shift.xy - xy * shift.z) * view.focal;
     let in_ellipse = vec2f(x * on_screen.x, lean * on_screen.x + y * on_screen.y);
-    // By Cauchy and Schwarz: the derivative by u is u times the one by the logarithm of alpha, the one by a size u².
+    // Bound by Cauchy-Schwarz: the derivative by u is u times the one by the logarithm of alpha, the one by a size u².
     most_shift = max(most_shift, dot(in_ellipse, in_ellipse) * sqrt(seen[10] * seen[11]) + shift.z * shift.z * seen[11]);
     add(i, k, stride[k] * dot(own.axes[k], by_position));
     add(i, GROWTH_STEP + k, dot(axes[k], by_axes[k]));

@@ -1,23 +1,26 @@
-// Moves the numbers of each splat against their derivatives: Adam (Kingma and Ba 2015). Derivatives are zero again afterwards, for the next views.
+// Updates the parameters of each splat by their derivatives: Adam (Kingma and Ba 2015). Clears the derivatives for the
+// next views.
 #import shared/group
 #import shared/refined
 
 struct RefineStep {
   splat_count: u32,
-  // From one row to the next.
+  // Stride between rows.
   row: u32,
-  // Harmonics of a splat in memory, all channels.
+  // Harmonics of a splat in memory, over all channels.
   harmonics: u32,
-  // What is left of the means of derivatives and of their squares, and what makes these right while there were few.
+  // Decay factors of the running means of derivatives and of their squares, and the bias corrections of the first
+  // steps.
   keep_mean: f32,
   keep_square: f32,
   mean_scale: f32,
   square_scale: f32,
-  // Derivatives far below this move little.
+  // Epsilon: derivatives far below it change little.
   least: f32,
-  // Part of Newton's step, along one number alone and by the largest curvature in a view, beyond which none goes.
+  // Limit of a step as a fraction of Newton's step along one parameter, computed with the largest curvature in any
+  // view.
   newton: f32,
-  // How far a step goes.
+  // Learning rates.
   position_rate: f32,
   growth_rate: f32,
   turn_rate: f32,
@@ -28,17 +31,17 @@ struct RefineStep {
 
 @group(0) @binding(0) var<uniform> step: RefineStep;
 @group(0) @binding(1) var<storage, read_write> numbers: array<f32>;
-// For each splat the degree that it keeps.
+// The degree that each splat keeps.
 @group(0) @binding(2) var<storage, read> degrees: array<u32>;
 @group(0) @binding(3) var<storage, read_write> gradients: array<f32>;
-// Means of the derivatives, and of their squares.
+// Running means of the derivatives, and of their squares.
 @group(0) @binding(4) var<storage, read_write> means: array<vec2f>;
-// Of each splat the largest curvatures in a view: see BEND_COLOUR.
+// The largest curvatures of each splat in any view: see BEND_COLOUR.
 @group(0) @binding(5) var<storage, read> bends: array<vec4f>;
 
 const LEAST_BEND = 1e-30;
 
-// How far to go along one of the numbers that are sought.
+// Length of the step along one parameter.
 fn stride_along(i: u32, number: u32, rate: f32, bend: u32) -> f32 {
   let at = number * step.row + i;
   let g = gradients[at];
@@ -70,7 +73,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let stride = strides(own.scales);
   let shift = own.axes * (stride * vector_along(i, 0u, step.position_rate, BEND_POSITION));
   let growth = vector_along(i, GROWTH_STEP, step.growth_rate, BEND_SHAPE);
-  // A turn by a small angle about the splat's own axes: q (1, turn / 2).
+  // A rotation by a small angle about the splat's own axes: q (1, turn / 2).
   let h = 0.5 * swings(stride) * vector_along(i, TURN_STEP, step.turn_rate, BEND_SHAPE);
   let v = q.yzw;
   let turned_q = normalize(vec4f(q.x - dot(v, h), v + q.x * h + cross(v, h)));

@@ -16,7 +16,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let block_id = group_index(workgroup_id);
   if (block_id >= plan.sort_blocks) { return; }
   let first = block_id * SORT_BLOCK + lane;
-  // All keys are on their way before the first is counted.
+  // All loads are issued before the first key is counted.
   var own: array<u32, SORT_BLOCK / SORT_THREADS>;
   for (var r = 0u; r < SORT_BLOCK / SORT_THREADS; r++) {
     let i = first + r * SORT_THREADS;

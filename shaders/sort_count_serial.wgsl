@@ -1,4 +1,4 @@
-// `sort_count` for processors that run few threads one after the other: a thread counts a whole block.
+// `sort_count` for software adapters, which run few threads sequentially: each thread counts a whole block.
 #import shared/plan
 #import shared/group
 #import shared/sort

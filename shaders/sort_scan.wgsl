@@ -1,5 +1,5 @@
-// Second third: for each digit the exclusive prefix sums of its counts over the blocks, and the total. A workgroup serves four digits, which
-// lie side by side: one vector.
+// Second third: for each digit the exclusive prefix sums of its counts over the blocks, and the total. A workgroup
+// handles four neighboring digits: one vector.
 #import shared/plan
 #import shared/sort
 #import shared/prefix_vectors
@@ -22,7 +22,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let first = start + lane * BLOCKS_PER_THREAD;
     var own: array<vec4u, BLOCKS_PER_THREAD>;
     for (var k = 0u; k < BLOCKS_PER_THREAD; k++) {
-      // Written in every round: a compiler was seen to keep a variable of the loop body from one round to the next.
+      // Written in every iteration, because one compiler kept a variable of the loop body from one iteration to the
+      // next.
       own[k] = vec4u(0u);
       if (first + k < blocks) { own[k] = counts[(first + k) * (DIGITS / DIGITS_PER_GROUP) + workgroup_id.x]; }
     }

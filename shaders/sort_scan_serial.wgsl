@@ -1,4 +1,4 @@
-// `sort_scan` for processors that run few threads one after the other: a thread sums up a whole digit.
+// `sort_scan` for software adapters, which run few threads sequentially: each thread sums a whole digit.
 #import shared/plan
 #import shared/sort
 

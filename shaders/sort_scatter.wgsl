@@ -1,10 +1,10 @@
-// Last third: every key moves to its place. Within a block keys are ranked 256 at a time by a bitmap for each digit,
+// Last third: moves every key to its place. Within a block keys are ranked 256 at a time by a bitmap for each digit,
 // which needs no subgroups, keeps equal digits in order (stable), and waits for no other workgroup.
 #import shared/sort_places
 
 const WORDS = SORT_THREADS / 32u;
 
-// Keys with each digit in the rounds before.
+// Keys with each digit in the previous rounds.
 var<workgroup> ranked: array<u32, DIGITS>;
 
 @compute @workgroup_size(SORT_THREADS)
@@ -19,8 +19,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   for (var r = 0u; r < ITEMS; r++) {
     let is_key = own_first + r * SORT_THREADS < plan.visible;
     let digit = digit_of(keys[r], digit_pass.shift);
-    // Bit t of [word][digit]: thread 32·word + t of this round has the digit. Threads that walk over digits side by side
-    // then touch neighbouring words.
+    // Bit t of [word][digit]: thread 32·word + t of this round has the digit. Neighboring threads that iterate over
+    // digits then access neighboring words.
     if (is_key) { atomicOr(&exchange[own_word * DIGITS + digit], bit); }
     workgroupBarrier();
 
@@ -35,7 +35,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     places[r] = first + before;
     workgroupBarrier();
 
-    // The last thread with a digit leaves the bitmap of that digit empty for the next round.
+    // The last thread with a digit clears the bitmap of that digit for the next round.
     if (is_key && before == count - 1u) {
       ranked[digit] = first + count;
       for (var w = 0u; w < WORDS; w++) { atomicStore(&exchange[w * DIGITS + digit], 0u); }

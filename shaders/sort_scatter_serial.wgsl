@@ -1,11 +1,12 @@
-// `sort_scatter` for processors that run few threads one after the other: a thread moves a whole block, in its order.
+// `sort_scatter` for software adapters, which run few threads sequentially: each thread moves a whole block, in its
+// order.
 #import shared/sort_scatter
 
 @compute @workgroup_size(1)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u) {
   let block_id = group_index(workgroup_id);
   if (block_id >= plan.sort_blocks) { return; }
-  // Where the next key with a digit goes.
+  // Index of the next key with each digit.
   var next: array<u32, DIGITS>;
   var smaller = 0u;
   for (var digit = 0u; digit < DIGITS; digit++) {

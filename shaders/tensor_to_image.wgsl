@@ -1,7 +1,7 @@
-// A tensor [1,3,height,width] to a picture, interpolated where sizes differ. The alpha is that of the frame which the tensor was made of,
-// and no colour exceeds it: premultiplied, and transparent where the scene is.
+// Converts a tensor [1,3,height,width] to an image, interpolated if sizes differ. The alpha is that of the input frame,
+// and colors are clamped to it: premultiplied, and transparent like the scene.
 @group(0) @binding(0) var<uniform> image: TensorToImage;
-// Float32, or two float16 to a word.
+// float32, or two float16 in each word.
 @group(0) @binding(1) var<storage, read> tensor: array<u32>;
 @group(0) @binding(2) var frame: texture_2d<f32>;
 
@@ -16,11 +16,11 @@ const HALF_EXPONENT = 0x7c00u;
 
 @vertex
 fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-  // One triangle that covers the image.
+  // One triangle covers the image.
   return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// An element, and whether it is finite.
+// An element of the tensor, and 1 if it is finite.
 fn element(index: u32) -> vec2f {
   if (image.is_half == 0u) {
     let bits = tensor[index];
@@ -32,7 +32,7 @@ fn element(index: u32) -> vec2f {
   return vec2f(unpack2x16float(bits).x, 1.0);
 }
 
-// Colour, and whether all of it is finite.
+// Color of a pixel, and 1 if all of it is finite.
 fn pixel(at: vec2u) -> vec4f {
   let plane = image.size.x * image.size.y;
   let index = at.y * image.size.x + at.x;
@@ -61,7 +61,7 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
   let size = textureDimensions(frame);
   var color: vec4f;
   if (all(size == image.size)) { color = pixel(at); } else { color = interpolated(position.xy, vec2f(size)); }
-  // Where the model failed the frame shows as it was drawn.
+  // Shows the unmodified frame if the output of the model is not finite.
   if (color.a < 1.0) { return plain; }
   let alpha = clamp(plain.a, 0.0, 1.0);
   return vec4f(clamp(color.rgb, vec3f(0.0), vec3f(alpha)), alpha);

@@ -1,4 +1,4 @@
-// Bins as the stages that list splats see them, whatever the tiles.
+// Bins for the stages that list splats, which are compiled for a tile size.
 #import shared/bins
 
 // Side of a tile in pixels: TILE or SORTED_TILE.

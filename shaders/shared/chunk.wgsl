@@ -1,4 +1,4 @@
-// Bounds of 256 splats in page-local coordinates: the box of their centres, and the farthest that any of them reaches with
+// Bounds of 256 splats in block-local coordinates: the box of their centers, and the largest reach of any of them with
 // alpha >= 1/255.
 struct Chunk {
   low: vec3f,

@@ -1,12 +1,12 @@
-// Whether a chunk may hold visible splats. The tests are linear in camera space, so that the corners of a box decide for all its
-// points, and err only towards keeping.
+// Tests whether a chunk may hold visible splats. The tests are linear in camera space, so the corners of a box decide
+// for all its points, and errors only keep too much.
 #import shared/view
 #import shared/chunk
 
-// Pixels that dilation can add to a splat's half extent (sqrt(0.3 · 2 ln 255) = 1.83), and one for rounding.
+// Pixels that dilation can add to the half extent of a splat (sqrt(0.3 · 2 ln 255) = 1.83), plus one for rounding.
 const MARGIN = 3.0;
 
-// Least value of normal · (camera-space point) over the box.
+// Minimum of normal · (camera-space point) over the box.
 fn least(view: View, center: vec3f, half_size: vec3f, normal: vec3f) -> f32 {
   let local = vec3f(
     dot(view.local_to_camera[0].xyz, normal), dot(view.local_to_camera[1].xyz, normal), dot(view.local_to_camera[2].xyz, normal),
@@ -21,10 +21,10 @@ fn may_be_visible(view: View, c: Chunk) -> bool {
   let half_size = 0.5 * (c.high - c.low);
   if (least(view, center, half_size, vec3f(0.0, 0.0, -1.0)) > -view.near) { return false; }
   if (least(view, center, half_size, vec3f(0.0, 0.0, 1.0)) > view.far) { return false; }
-  // The Jacobian stretches a splat by at most focal / z · sqrt(1 + t²): times z, that does not depend on the point.
+  // The Jacobian stretches a splat by at most focal / z · sqrt(1 + t²); times z, that is the same for all points.
   let t = max(abs(view.jacobian_min), abs(view.jacobian_max));
   let reach = 1.001 * c.reach * view.stretch * view.focal * sqrt(1.0 + t * t);
-  // The edges of the image, in pixels: they lie as far out as the depth says, or everywhere alike.
+  // The edges of the image, in pixels: scaled by the depth if rays diverge, constant if they are parallel.
   let low = -view.principal - MARGIN;
   let high = view.principal - view.viewport - MARGIN;
   let grows = select(1.0, 0.0, view.is_orthographic != 0u);

@@ -1,19 +1,20 @@
-// What becomes of accumulated splats: they are laid over the background as premultiplied colour. An accumulation smaller than the target is
-// interpolated between its pixels' centres by a cubic, which keeps more of fine detail than straight lines do (1 to 2 dB).
+// Composes accumulated splats over the background as premultiplied color. An accumulation smaller than the target is
+// upsampled by a cubic filter, which keeps more of fine detail than a linear one (1 to 2 dB).
 @group(0) @binding(0) var<uniform> compose: Compose;
-// Colour, and transmittance in the alpha channel.
+// Color, with the transmittance in the alpha channel.
 @group(0) @binding(1) var accumulated: texture_2d<f32>;
 
 struct Compose {
   // Premultiplied red, green, blue and alpha.
   background: vec4f,
-  // Pixels of the accumulation for each pixel of the target, across and down; 1 where they are the same size.
+  // Pixels of the accumulation for each pixel of the target, across and down; 1 if the sizes are equal.
   scale: vec2f,
-  // Pixels of the accumulation that are in use, from its first on.
+  // Size of the used region of the accumulation, in pixels from its first one.
   used: vec2f,
 }
 
-// Weights of four pixels in a row: the cubic of Catmull and Rom (1974), a share of the way from the second to the third.
+// Weights of four pixels in a row: the cubic of Catmull and Rom (1974) at a fraction of the way from the second to the
+// third.
 fn cubic_weights(share: f32) -> vec4f {
   let t = vec4f(1.0, share, share * share, share * share * share);
   return mat4x4f(0.0, 1.0, 0.0, 0.0, -0.5, 0.0, 0.5, 0.0, 1.0, -2.5, 2.0, -0.5, -0.5, 1.5, -1.5, 0.5) * t;
@@ -33,17 +34,17 @@ fn interpolated(position: vec2f) -> vec4f {
     }
     sum += down[y] * row;
   }
-  // The cubic overshoots beside an edge.
+  // Clamped because the cubic overshoots beside edges.
   return vec4f(max(sum.rgb, vec3f(0.0)), clamp(sum.a, 0.0, 1.0));
 }
 
-// Colour and transmittance at the centre of a pixel.
+// Color and transmittance at the center of a pixel.
 fn painted(position: vec2f) -> vec4f {
   if (all(compose.scale == vec2f(1.0))) { return textureLoad(accumulated, vec2u(position), 0); }
   return interpolated(position);
 }
 
-// The target's colour at the centre of a pixel.
+// Color of the target at the center of a pixel.
 fn composed(position: vec2f) -> vec4f {
   let pixel = painted(position);
   let transmittance = pixel.a;

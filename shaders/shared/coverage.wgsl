@@ -1,22 +1,22 @@
-// Which rectangles of pixels the visible part of a splat, the ellipse with alpha >= ALPHA_MIN, touches: exactly.
+// Finds exactly which rectangles of pixels the visible part of a splat, the ellipse with alpha >= ALPHA_MIN, touches.
 #import shared/splat
 #import shared/falloff
 
-// Pixels by which whoever asks makes a band larger than exact: rounding must not lose a pixel on the rim.
+// Callers enlarge a band by this many pixels, because rounding must not lose a pixel on the rim.
 const RIM = 0.01;
-// Beyond it, px², a splat covers every image; infinity has no square root that helps.
+// Beyond this variance, px², a splat covers every image; the square root of infinity would be useless.
 const VARIANCE_MAX = 1e36;
 
-// The ellipse u² + v² <= radius², prepared for questions about horizontal bands.
+// The ellipse u² + v² <= radius², prepared for tests against horizontal bands.
 struct Coverage {
   center: vec2f,
   // Half width and half height in pixels.
   extent: vec2f,
-  // dx/dy of the line through the middles of all horizontal chords.
+  // dx/dy of the line through the midpoints of all horizontal chords.
   lean: f32,
-  // Half length of the longest chord, the one through the centre.
+  // Half length of the longest chord, which passes through the center.
   half_chord: f32,
-  // Height above the centre of the rightmost point.
+  // Height above the center of the rightmost point.
   rightmost_y: f32,
   // 1 / extent.y
   inverse_height: f32,
@@ -28,7 +28,7 @@ fn coverage_of(s: ProjectedSplat) -> Coverage {
   let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
   let radius = cutoff_radius(bitcast<f32>(s.paint.w));
   let sheared = slope * sigma_x;
-  // Divisions are what this costs: one here, for all bands.
+  // Divisions dominate the cost: there is one here, for all bands.
   let variance_y = min(sheared * sheared + sigma_v * sigma_v, VARIANCE_MAX);
   let inverse_sigma_y = inverseSqrt(variance_y);
   let sigma_y = variance_y * inverse_sigma_y;
@@ -54,7 +54,7 @@ fn band_range(c: Coverage, top: f32, bottom: f32) -> vec2f {
   return c.center.x + vec2f(left, right);
 }
 
-// Right (side 1) or left (side -1) end of the chord at height y, relative to the centre.
+// Right (side 1) or left (side -1) end of the chord at height y, relative to the center.
 fn chord_end(c: Coverage, y: f32, side: f32) -> f32 {
   let t = y * c.inverse_height;
   return c.lean * y + side * c.half_chord * sqrt(max(0.0, 1.0 - t * t));

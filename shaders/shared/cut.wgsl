@@ -1,8 +1,9 @@
-// How much of a splat lies in the shape of a cut: the share of a Gaussian between parallel planes, where the shape's surface is taken as its tangent plane.
+// Finds the fraction of a splat inside the shape of a cut: that of a Gaussian between parallel planes, with the surface
+// of the shape approximated by its tangent plane.
 #import shared/gaussian
 #import shared/modifiers
 
-// Cumulative distribution of the normal distribution (Abramowitz and Stegun 7.1.26), to 1e-7.
+// Cumulative distribution function of the normal distribution (Abramowitz and Stegun 7.1.26), to 1e-7.
 fn normal_below(x: f32) -> f32 {
   let z = min(abs(x) * 0.70710678, 8.0);
   let t = 1.0 / (1.0 + 0.3275911 * z);
@@ -10,7 +11,7 @@ fn normal_below(x: f32) -> f32 {
   return select(1.0 - tail, tail, x < 0.0);
 }
 
-// Share of a splat for which a coordinate of the shape lies between two values. The gradient is that of the coordinate.
+// Fraction of a splat with a coordinate of the shape between two values; `gradient` is that of the coordinate.
 fn share_between(g: Gaussian, coordinate: f32, gradient: vec3f, low: f32, high: f32, edge: f32) -> f32 {
   if (edge < 0.0) { return select(0.0, 1.0, coordinate >= low && coordinate <= high); }
   let spread = vec3f(dot(g.factor_x, gradient), dot(g.factor_y, gradient.yz), g.factor_z * gradient.z);
@@ -40,7 +41,7 @@ fn share_in_shape(cut: ModifierCut, g: Gaussian) -> f32 {
   }
 }
 
-// Share of a splat that a cut changes.
+// Fraction of a splat that a cut changes.
 fn share_cut(cut: ModifierCut, g: Gaussian) -> f32 {
   let inside = share_in_shape(cut, g);
   return select(inside, 1.0 - inside, cut.is_outside != 0u);

@@ -1,17 +1,17 @@
-// The depth at which a splat is densest along the ray of a pixel, of its Gaussian.
+// The densest depth of a Gaussian along the ray of a pixel.
 #import shared/projection
 #import shared/pixel_depth
 
 struct DensestDepth {
   depth: PixelDepth,
-  // Depth of the center, and the standard deviation of the densest depth over the screen, world units.
+  // Depth of the center, and the standard deviation of the densest depth over the screen, in world units.
   center: f32,
   spread: f32,
   // Standard deviation of the Gaussian along the camera's axis.
   sigma: f32,
 }
 
-// `filter_variance` in px² widens the Gaussian on the screen: that of the view for the splat as it is painted.
+// `filter_variance` in px² widens the Gaussian on the screen: pass that of the view for the splat as drawn.
 fn pixel_depth_of(view: View, g: Gaussian, filter_variance: f32) -> DensestDepth {
   var p = in_camera(view, g.position);
   p.z = max(p.z, view.near);
@@ -24,13 +24,14 @@ fn pixel_depth_of(view: View, g: Gaussian, filter_variance: f32) -> DensestDepth
     to_camera[1] * g.factor_y.x + to_camera[2] * g.factor_y.y,
     to_camera[2] * g.factor_z,
   );
-  // Pixels across and down of the splat's own axes, seen along the ray through its centre, and how deep they go.
+  // Pixels across and down of the axes of the splat, seen along the ray through its center, and their depths.
   let a = transpose(axes);
   let row_x = (a[0] - t.x * a[2]) * (view.focal.x / shrink);
   let row_y = (a[1] - t.y * a[2]) * (view.focal.y / shrink);
   let row_z = a[2];
 
-  // Depth by x, and by what y has besides: as the ellipse is taken apart (shared/ellipse), so that needles keep their digits.
+  // Regression of depth on x, and on the residual of y: the same factorization as the ellipse (shared/ellipse), so that
+  // needles keep their digits.
   let variance_x = dot(row_x, row_x) + filter_variance;
   let by_x = dot(row_z, row_x) / variance_x;
   let lean = dot(row_x, row_y) / variance_x;
@@ -46,11 +47,11 @@ fn pixel_depth_of(view: View, g: Gaussian, filter_variance: f32) -> DensestDepth
   return DensestDepth(depth, p.z, sqrt(spread), length(row_z));
 }
 
-// Least variance that a Gaussian is taken to have on the screen, px²: what is seen edge on has a densest point, too.
+// Minimum screen variance of a Gaussian in px², so that a disc seen edge-on has a densest point, too.
 const SURFACE_VARIANCE = 1e-3;
 
-// Depth in world units at which the Gaussian itself, without the filter of the screen, is densest along the ray of a pixel: at most 3 standard deviations from its
-// center.
+// Densest depth, in world units, of the unfiltered Gaussian along the ray of a pixel: at most 3 standard deviations
+// from its center.
 fn surface_depth(view: View, g: Gaussian, pixel: vec2f) -> f32 {
   let found = pixel_depth_of(view, g, SURFACE_VARIANCE);
   let e = project_ellipse(view, g);

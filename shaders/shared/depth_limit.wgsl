@@ -1,10 +1,10 @@
-// How the depth that a host has drawn hides splats.
+// The depth buffer of a host, which hides splats.
 struct SceneDepth {
   // A stored value d is the camera depth (x d + y) / (z d + w) in world units.
   inverse: vec4f,
-  // Texels for each pixel that is drawn, across and down.
+  // Texels for each drawn pixel, across and down.
   scale: vec2f,
-  // What is stored where there is nothing.
+  // Clear value of the depth buffer.
   nothing: f32,
 }
 

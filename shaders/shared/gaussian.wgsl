@@ -1,4 +1,5 @@
-// A Gaussian as the stages reckon with it, in page-local coordinates. How it lies in memory: shared/packed_gaussian, shared/quantized_gaussian.
+// A Gaussian for computation, in block-local coordinates. Storage layouts: shared/packed_gaussian,
+// shared/quantized_gaussian.
 struct Gaussian {
   position: vec3f,
   opacity: f32,

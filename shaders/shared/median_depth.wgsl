@@ -1,7 +1,7 @@
-// The depth of a pixel: that of the splat at which half of the light is gone.
+// Depth of a pixel: that of the splat that halves its transmittance.
 #import shared/paint_columns
 
-// Of the splats of the batch, and of the one that stands for a missing one.
+// For the splats of the batch and the placeholder.
 var<workgroup> batch_depths: array<f32, BATCH + 1u>;
 var<private> half_depth: Column;
 

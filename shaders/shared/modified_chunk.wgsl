@@ -1,4 +1,4 @@
-// In place of `may_be_visible`: splats that a page moves may be seen where their chunk is not.
+// Replaces `may_be_visible`, because splats that a modifier moves may be visible outside their chunk.
 #import shared/chunk_visibility
 #import shared/modifiers
 

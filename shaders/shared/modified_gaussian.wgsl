@@ -1,28 +1,29 @@
-// Splats as a page wants them: cuts, then the page's own function, then how the scene appears. Variants of the stages that read Gaussians (`cull_modified` of
-// `cull` and so on: scripts/build-shaders.mjs) call these functions in place of `unpack_gaussian` and `pack_splat`.
+// Applies modifiers to splats: cuts, then the hook of the page, then the reveal effect. Variants of the stages that
+// read Gaussians (`cull_modified` of `cull` and so on: scripts/build-shaders.mjs) call these functions instead of
+// `unpack_gaussian` and `pack_splat`.
 #import shared/cut
 #import shared/splat_hook
 #import shared/stored_gaussian
 #import shared/scene_opacity
 #import shared/splat
 
-// Splats that stand for more than themselves are larger, to a limit.
+// Limit of the enlargement of splats that represent others.
 const COARSEST_SHARE = 0.015625;
-// Share of the reveal in which one splat appears.
+// Fraction of the reveal during which one splat fades in.
 const SHARE_RAMP = 0.1;
-// Bits of a length that squares to a number.
+// Bits of the largest length whose square is finite.
 const FARTHEST_BITS = 0x5d000000u;
 const LARGEST_SCALE = 1000.0;
-// A splat without a size has no image.
+// Minimum scale: a splat without a size would have no image.
 const SMALLEST_SCALE = 1e-4;
 
-// Of the splat at hand: shares that the cuts change, and what the page's function was given.
+// State of the current splat: fractions that the cuts change, and the arguments of the hook.
 var<private> cut_shares: array<f32, MOST_CUTS>;
 var<private> hooked_position: vec3f;
 var<private> hooked_opacity: f32;
 var<private> visible_opacity: f32;
 
-// Nothing that a page computes may spread: no infinity, no number beyond bounds.
+// Rejects infinities and out-of-range values of a hook, so that they do not propagate.
 fn is_bounded(x: f32) -> bool {
   return (bitcast<u32>(x) & 0x7fffffffu) < FARTHEST_BITS;
 }
@@ -53,7 +54,7 @@ fn hook_values(color: vec3f) -> mat3x3f {
   return splat_hook(hooked_position, color, hooked_opacity, modifiers.time, modifiers.values);
 }
 
-// Position and size. An opacity that is lower follows with the color, on which it may depend.
+// Applies position and size. A lower opacity is applied later with the color, on which it may depend.
 fn apply_hook(g: ptr<function, Gaussian>) {
   if (modifiers.is_hooked == 0u) { return; }
   let p = vec4f((*g).position, 1.0);
@@ -69,7 +70,7 @@ fn apply_hook(g: ptr<function, Gaussian>) {
   visible_opacity = (*g).opacity;
 }
 
-// 0..1, always the same for a position.
+// Pseudo-random number in 0..1 that depends only on the position.
 fn random_of(position: vec3f) -> f32 {
   let bits = bitcast<vec3u>(position) * vec3u(0x9e3779b1u, 0x85ebca77u, 0xc2b2ae3du);
   var h = bits.x ^ (bits.y >> 7u) ^ (bits.z << 9u);
@@ -99,7 +100,7 @@ fn modified_gaussian(found: FoundGaussian) -> Gaussian {
   return g;
 }
 
-// With the colors that `modified_gaussian` did not know.
+// Packs a splat with its color, which `modified_gaussian` did not have yet.
 fn pack_modified(ellipse: Ellipse, color: vec3f) -> ProjectedSplat {
   var e = ellipse;
   var c = color;

@@ -1,4 +1,5 @@
-// What a page does to the splats of a scene while they are projected. packages/renderer/src/modifiers writes it, in page-local coordinates.
+// Modifiers of the splats of a scene, applied during projection. packages/renderer/src/modifiers writes them, in
+// block-local coordinates.
 #import shared/view
 
 const MOST_CUTS = 16u;
@@ -10,7 +11,7 @@ const CUT_CYLINDER = 2u;
 const CUT_PLANE = 3u;
 
 struct ModifierCut {
-  // Rows of the affine map to the shape's coordinates.
+  // Rows of the affine map to the coordinates of the shape.
   to_shape_x: vec4f,
   to_shape_y: vec4f,
   to_shape_z: vec4f,
@@ -25,11 +26,11 @@ struct ModifierCut {
   opacity: f32,
   // Factor of the optical depth (shared/scene_opacity).
   thinned: f32,
-  // Standard deviation of the edge besides that of the splat; below 0 the center alone decides.
+  // Standard deviation of the soft edge, in addition to that of the splat; if negative, only the center decides.
   edge: f32,
-  // 1 if the cut changes what lies outside of its shape.
+  // 1 if the cut changes the splats outside its shape.
   is_outside: u32,
-  // 1 if it changes colors.
+  // 1 if the cut changes colors.
   has_color: u32,
   reserved_a: u32,
   reserved_b: u32,
@@ -44,17 +45,17 @@ struct Modifiers {
   from_viewer_x: vec3f,
   cut_count: u32,
   from_viewer_y: vec3f,
-  // 1 if the page has a function of its own.
+  // 1 if the page defines a hook.
   is_hooked: u32,
   from_viewer_z: vec3f,
   // Seconds.
   time: f32,
-  // Where the scene grows from, and how large it is by now: 1 for whole.
+  // Center of the reveal, and the current scale of the scene: 1 when complete.
   center: vec3f,
   grown: f32,
-  // Share of the splats that stand for all: 1 for all of them.
+  // Fraction of the splats that represent all; 1 for all of them.
   share: f32,
-  // 1 if splats may be elsewhere, or larger, than their chunks say.
+  // 1 if splats may leave the bounds of their chunks.
   moves: u32,
   reserved_a: u32,
   reserved_b: u32,

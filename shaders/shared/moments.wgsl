@@ -1,5 +1,5 @@
-// Moments of the basis functions of a splat's colour over the views: the lower triangle of a symmetric matrix, rows outermost. In memory each number has a row
-// with one for every splat of the part.
+// Moments of the color basis functions of a splat over the views: the lower triangle of a symmetric matrix, row-major.
+// In memory each entry has a row with one number for every splat of the block.
 #import shared/sh
 
 const MAX_COEFFICIENTS = 16u;

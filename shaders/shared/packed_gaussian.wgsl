@@ -1,22 +1,23 @@
-// The geometry of a Gaussian in 32 bytes, as precise as images need.
+// The geometry of a Gaussian in 32 bytes, precise enough for images.
 #import shared/gaussian
 
-// A Gaussian as it lies in memory: 32 bytes. Loaded as integers, because only integer bits can tell a NaN or an infinity:
-// WGSL lets compilers assume that floating-point maths never meets one.
+// Storage layout of a Gaussian: 32 bytes. Loaded as integers, because only integer bits can reveal a NaN or an
+// infinity: WGSL allows compilers to assume that floating-point math never produces one.
 struct PackedGaussian {
-  // x, y, z (float32, page-local); in the upper 22 bits of the last word the upper 22 of a float32, factor xx, and so on
-  // for yx, yy, zx, zy in `tail`. The lower 10 bits of these five words hold, in turn, the upper 22 bits of factor zz and
-  // the upper 28 of the opacity.
+  // x, y, z (float32, block-local); in the upper 22 bits of the last word the upper 22 of a float32, factor xx, and so
+  // on for yx, yy, zx, zy in `tail`. The lower 10 bits of these five words hold, in turn, the upper 22 bits of factor
+  // zz and the upper 28 of the opacity.
   head: vec4u,
   tail: vec4u,
 }
 
 const EXPONENT_BITS = 0x7f800000u;
 const HIGH_22 = 0xfffffc00u;
-// Longest standard deviation of a splat that can be drawn: MIN_LONGEST_SCALE and MAX_SCALE of core.
+// Longest standard deviation of a drawable splat: MIN_LONGEST_SCALE and MAX_SCALE of core.
 const MIN_LONGEST_SCALE = 1e-12;
 const MAX_SCALE = 1e12;
-// Bits of the largest coordinate of one, MAX_POSITION of core: integers, because bounds of chunks must never see a NaN or an infinity.
+// Bits of its largest coordinate, MAX_POSITION of core: compared as integers, because bounds of chunks must never
+// contain a NaN or an infinity.
 const MAX_POSITION_BITS = 0x5d5e0b6bu;
 
 // The float32 words of factor xx, yx, yy, zx and of factor zy, zz and the opacity.
@@ -44,13 +45,13 @@ fn position_of(g: PackedGaussian) -> vec3f {
   return bitcast<vec3f>(g.head.xyz);
 }
 
-// Four float32 with an exponent other than that of NaN and infinity.
+// Whether four float32 have exponents other than that of NaN and infinity.
 fn has_finite_bits(words: vec4u) -> bool {
   let exponents = words & vec4u(EXPONENT_BITS);
   return all(exponents != vec4u(EXPONENT_BITS));
 }
 
-// True if every number is finite, and neither position nor factor beyond all bounds nor the latter nothing.
+// Whether all numbers are finite and in range, and the factor is not zero.
 fn is_usable(g: PackedGaussian) -> bool {
   let words = shape_words(g);
   let is_near = all((g.head.xyz & vec3u(0x7fffffffu)) <= vec3u(MAX_POSITION_BITS));
@@ -58,6 +59,6 @@ fn is_usable(g: PackedGaussian) -> bool {
   let own = abs(bitcast<vec4f>(words[0]));
   let rest = abs(bitcast<vec4f>(words[1]));
   let largest = max(max(max(own.x, own.y), max(own.z, own.w)), max(rest.x, rest.y));
-  // No number of the factor is longer than the longest axis, and the largest is at least 1/√3 of it.
+  // No entry of the factor exceeds the longest axis, and the largest entry is at least 1/√3 of it.
   return finite && largest >= 0.5 * MIN_LONGEST_SCALE && largest <= 1.001 * MAX_SCALE;
 }

@@ -1,5 +1,6 @@
-// How a column of four pixels takes the splats of a batch: as they are listed, by the depth of their centers. What a splat costs a thread, whatever the pixel, it costs once
-// for four. Whoever imports this says what hides splats (`start_hiding`, `hide`, `hide_rest`) and what is noted on the way (`note_blend`, `note_pixel`).
+// Blends the splats of a batch into a column of four pixels, in the order of their center depths. Work that does not
+// depend on the pixel is done once for all four. The importing module defines how splats are hidden (`start_hiding`,
+// `hide`, `hide_rest`) and which auxiliary outputs are written (`aux_blend`, `aux_pixel`).
 #import shared/paint_tiles
 
 const SIDE: u32 = TILE;
@@ -11,8 +12,8 @@ struct Pixels {
   red: Column,
   green: Column,
   blue: Column,
-  // What passes all splats so far, and what passes those that were blended. They differ once a pixel is finished: the first goes on falling, so that the comparison that
-  // refuses a splat refuses all that come later.
+  // Transmittance of all splats until here, and of the blended ones. They differ once a pixel is finished: the first
+  // keeps falling, so the comparison that rejects one splat rejects all later ones.
   light: Column,
   transmittance: Column,
 }
@@ -34,7 +35,8 @@ fn are_finished(pixels: Pixels) -> bool {
   return all(pixels.light <= Column(view.transmittance_min));
 }
 
-// Blends splat k of the batch. Without a branch, which takes a third more time: where the splat does not reach, and where a pixel is finished, nothing is added.
+// Blends splat k of the batch. It has no branch, which would take a third more time: splats that miss the pixel and
+// finished pixels add zero.
 fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, least_power: f32) {
   let axis = axes[k];
   let paint = paints[k];
@@ -61,7 +63,8 @@ fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, least_power: f32) 
 fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, least_power: f32) {
   for (var word = 0u; word < BATCH_WORDS; word++) {
     if (are_finished(*pixels)) { break; }
-    // Of these 32 splats those that touch the block, two at once: the second is read while the first is blended.
+    // Visits those of these 32 splats that touch the block, two at a time: the second is loaded while the first is
+    // blended.
     var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
     while (ahead > 0u) {
       let k = word * 32u + zeros_below(ahead);

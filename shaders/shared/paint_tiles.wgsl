@@ -1,49 +1,51 @@
-// Paints tiles, one workgroup each, front to back in float32 registers, and stops when nothing behind can be seen. Whoever imports this says:
+// Rasterizes tiles, one workgroup each, front to back in float32 registers, and stops when nothing behind is visible.
+// The importing module defines:
 // - `SIDE` of a tile and `COLUMN`, the pixels of a thread, one above the other: SIDE · SIDE = 256 · COLUMN;
 // - `Pixels`, a thread's pixels, with `start_pixels`, `paint_batch`, `are_finished` and `finish_pixels`;
-// - what it keeps of a splat besides: `packed_color`, `load_more`, `clear_notes` and `keep_notes`.
+// - additional data for each splat: `packed_color`, `load_more`, `aux_clear` and `aux_store`.
 #import shared/bits
 #import shared/group
 #import shared/tile_list
 #import shared/tile_image
 
-// Bins in the order in which they are painted.
+// Bins in rasterization order.
 @group(0) @binding(6) var<storage, read> bin_order: array<u32>;
 
-// True if the splat that would leave a pixel too little light is refused, as trainers do at REFUSED; false if it is blended and the pixel ends behind it: at
-// a higher threshold a refused splat is a hole, since an opaque one leaves 1/1,000 by itself.
+// True to reject the splat that would reduce the transmittance below the threshold, as trainers do at REFUSED; false to
+// blend it and end the pixel behind it. At a higher threshold a rejected splat would be a hole, since an opaque one
+// leaves only 1/1,000.
 override refuses_last: bool = true;
 
-// Splats of a batch.
+// Splats in each batch.
 const BATCH = TILE_THREADS;
 const BATCH_WORDS = BATCH / 32u;
-// A tile has 4 x 4 blocks of pixels; neighboring threads paint one, and skip together the splats that do not touch it.
+// A tile has 4 x 4 blocks of pixels; neighboring threads draw one block, and skip splats that do not touch it together.
 const BLOCK_COLUMNS = 4u;
 const BLOCK_ROWS = 4u;
 const BLOCK_WIDTH = SIDE / BLOCK_COLUMNS;
 const BLOCK_HEIGHT = SIDE / BLOCK_ROWS;
 const BLOCKS = BLOCK_COLUMNS * BLOCK_ROWS;
 const BLOCK_THREADS = TILE_THREADS / BLOCKS;
-// Light that trainers leave a pixel at least.
+// Minimum transmittance of a pixel in training.
 const REFUSED = 1e-4;
-// Place of the splat that stands for a missing one, and log2 of its opacity.
+// Index of the placeholder for a missing splat, and log2 of its opacity.
 const NO_SPLAT = BATCH;
 const NO_POWER = -1e30;
 // sqrt(log2(e) / 2): in axes stretched by it a Gaussian is 2^-(u² + v²).
 const BASE_2_AXIS = 0.8493218002880191;
 
-// The splats of a batch, front to back, as the pixels of the tile see them, and behind the last place one that reaches no pixel. At x, y from the tile's corner alpha is
-// 2^(power - u² - v²) with u = u_x · x + u_0 and v = v_x · x + v_y · y + v_0. Vectors, because some compilers read a struct word by word:
-// u_x, u_0, v_x, v_y;
+// The splats of a batch, front to back, relative to the tile, followed by a placeholder that reaches no pixel. At x, y
+// from the tile's corner alpha is 2^(power - u² - v²) with u = u_x · x + u_0 and v = v_x · x + v_y · y + v_0. Vectors,
+// because some compilers read a struct word by word: u_x, u_0, v_x, v_y;
 var<workgroup> axes: array<vec4f, BATCH + 1u>;
-// v_0 and power as the bits of a float32, and the words of `packed_color`.
+// v_0 and power as float32 bits, and the words of `packed_color`.
 var<workgroup> paints: array<vec4u, BATCH + 1u>;
-// For each block of the tile a bit for each splat of the batch that touches it.
+// For each block of the tile one bit for each splat of the batch that touches it.
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
 
-// The topmost of a thread's pixels.
+// The topmost pixel of a thread.
 fn pixel_in_tile(lane: u32) -> vec2u {
   let number = lane / BLOCK_THREADS;
   let in_block = lane % BLOCK_THREADS;
@@ -52,13 +54,14 @@ fn pixel_in_tile(lane: u32) -> vec2u {
   return vec2u(x, y);
 }
 
-// Sets the bits of splat k of the batch for the blocks of the tile that it touches.
+// Sets the bits of splat k of the batch in the blocks of the tile that it touches.
 fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
   let c = coverage_of(s);
   let word = k / 32u;
   let bit = 1u << (k % 32u);
   let size = vec2f(f32(BLOCK_WIDTH), f32(BLOCK_HEIGHT));
-  // Row k holds the pixel centers k·height + 0.5 ... (k + 1)·height - 0.5. Only the rows at hand: threads side by side have others.
+  // Row k holds the pixel centers k·height + 0.5 ... (k + 1)·height - 0.5. The loop covers only the rows that the splat
+  // touches, because neighboring threads touch other rows.
   let low = c.center.y - c.extent.y - tile_corner.y - RIM;
   let high = c.center.y + c.extent.y - tile_corner.y + RIM;
   let first_row = clamp(ceil((low + 0.5) / size.y) - 1.0, 0.0, f32(BLOCK_ROWS));
@@ -101,7 +104,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let tile = vec2u(bin % view.bins.x, bin / view.bins.x) * vec2u(BIN_COLUMNS, BIN_ROWS)
     + vec2u(tile_in_bin % BIN_COLUMNS, tile_in_bin / BIN_COLUMNS);
   let corner = tile * SIDE;
-  // Bins at the edges have tiles beyond the image.
+  // Bins at the edges have tiles outside the image.
   if (any(vec2f(corner) >= view.viewport)) { return; }
   let position = corner + pixel_in_tile(lane);
   let place = vec2f(pixel_in_tile(lane)) + 0.5;

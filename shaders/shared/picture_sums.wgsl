@@ -1,4 +1,5 @@
-// Sums over the 256 threads of a workgroup by halves, so that each number meets only others like it: of squares, and of what is counted.
+// Sums over the 256 threads of a workgroup by halving, so that numbers of similar magnitude are added: sums of squares,
+// and counts.
 const SUM_THREADS = 256u;
 
 var<workgroup> halves: array<vec2f, SUM_THREADS>;

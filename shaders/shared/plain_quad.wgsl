@@ -1,5 +1,5 @@
-// A quad of a splat alone. The fragment evaluates the Gaussian at the pixel centre from flat inputs, so nothing is interpolated and the
-// maths is that of any other rasterizer.
+// A quad of a splat in a scene without meshes. The fragment evaluates the Gaussian at the pixel center from flat
+// inputs, so nothing is interpolated and the math equals that of the other rasterizers.
 #import shared/quad
 
 struct Quad {
@@ -24,6 +24,6 @@ fn fragment(quad: Quad) -> @location(0) vec4f {
   let offset = quad.position.xy - quad.shape.xy;
   let alpha = alpha_at(offset, quad.shape.z, quad.shape.w, quad.inverse_sigma_v, quad.color.a);
   if (alpha < ALPHA_MIN) { discard; }
-  // Blended as colour = alpha · color + (1 - alpha) · colour and transmittance = (1 - alpha) · transmittance.
+  // Blended as color = alpha · color + (1 - alpha) · color behind, and transmittance = (1 - alpha) · transmittance.
   return vec4f(quad.color.rgb * alpha, alpha);
 }

@@ -1,13 +1,14 @@
-// Counts of one frame, written on the GPU and never read back on the frame path: dispatches are as large as there is room for, and their groups end at once
-// beyond these counts (an indirect dispatch costs browsers up to a millisecond, decision 18).
+// Counts of one frame, written on the GPU and never read back on the frame path. Dispatches are as large as the
+// capacity, and groups beyond these counts end at once, because an indirect dispatch costs browsers up to a millisecond
+// (decision 18).
 struct Plan {
-  // Splats to draw: those that survive culling, at most the capacity of the renderer's buffers.
+  // Splats to draw: the survivors of culling, at most the capacity of the renderer's buffers.
   visible: u32,
-  // Survivors that found no room.
+  // Survivors beyond the capacity.
   overflow: u32,
   // Blocks of SORT_BLOCK keys.
   sort_blocks: u32,
-  // In depth order the survivors of all pages are mixed, and each page is given all of them.
+  // In depth order the survivors of all blocks are mixed, so each block processes all of them.
   pages: array<PagePlan>,
 }
 
@@ -19,5 +20,5 @@ struct PagePlan {
 
 // Keys of one workgroup of the sort.
 const SORT_BLOCK = 2048u;
-// Quads drawn as one instance: instances of four vertices leave most lanes of a GPU idle.
+// Quads drawn as one instance, because instances of four vertices leave most lanes of a GPU idle.
 const QUAD_BATCH = 128u;

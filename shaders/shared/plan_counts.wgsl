@@ -1,21 +1,21 @@
-// What the stages after `cull` find in the plan, from the prefix sums of its counts.
+// Writes the counts for the stages after `cull` from the prefix sums.
 #import shared/plan
 #import shared/group
 
 @group(0) @binding(1) var<uniform> limits: PlanLimits;
-// For each page the first of its sums and the one behind its last.
+// For each block the index of its first sum and the index after its last.
 @group(0) @binding(2) var<storage, read> page_ranges: array<vec2u>;
 @group(0) @binding(3) var<storage, read_write> plan: Plan;
 
 struct PlanLimits {
   page_count: u32,
-  // Splats that the renderer's buffers have room for.
+  // Capacity of the renderer's buffers in splats.
   capacity: u32,
-  // Counts: groups of splats, or blocks of an order.
+  // Number of counts: groups of splats, or blocks of the sort.
   length: u32,
 }
 
-// By one thread: a few dozen words.
+// One thread suffices for a few dozen words.
 fn write_plan() {
   let total = value_at(limits.length);
   let visible = min(total, limits.capacity);

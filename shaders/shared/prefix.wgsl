@@ -1,4 +1,5 @@
-// Prefix sums over the 256 threads of a workgroup, by doubling steps between two halves of one array: one barrier a step.
+// Prefix sums over the 256 threads of a workgroup: doubling steps that alternate between two halves of one array, with
+// one barrier in each step.
 #import shared/saturating
 
 const PREFIX_THREADS = 256u;
@@ -6,7 +7,7 @@ const PREFIX_THREADS = 256u;
 var<workgroup> ladder: array<u32, 2u * PREFIX_THREADS>;
 
 // Sum of `own` over all threads of the same row up to and including this one; rows are `width` threads wide (a power of
-// two). Must be called by all threads. Ends with a barrier after which another call may follow.
+// two). Must be called by all threads. Ends with a barrier, so another call may follow.
 fn inclusive_sum(own: u32, lane: u32, width: u32) -> u32 {
   let column = lane % width;
   var sum = own;

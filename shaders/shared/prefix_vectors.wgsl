@@ -1,4 +1,4 @@
-// Prefix sums over the threads of a workgroup of four numbers side by side: shared/prefix for vectors.
+// Prefix sums of four numbers at once over the threads of a workgroup: shared/prefix for vectors.
 #import shared/prefix
 
 fn add_vectors_saturating(a: vec4u, b: vec4u) -> vec4u {
@@ -8,8 +8,8 @@ fn add_vectors_saturating(a: vec4u, b: vec4u) -> vec4u {
 
 var<workgroup> vector_ladder: array<vec4u, 2u * PREFIX_THREADS>;
 
-// Sum of `own` over all threads up to and including this one. Must be called by all threads. Ends with a barrier after which another call may
-// follow.
+// Sum of `own` over all threads up to and including this one. Must be called by all threads. Ends with a barrier, so
+// another call may follow.
 fn inclusive_sums(own: vec4u, lane: u32) -> vec4u {
   var sum = own;
   var side = 0u;

@@ -1,14 +1,15 @@
-// What lies under a point of the image: written by `probe_depth`, and made exact by `probe_surface`.
+// Result of a probe: written by `probe_depth`, refined by `probe_surface`.
 struct ProbeAnswer {
-  // Depths of the splats behind which less than 90, 50 and 10 % of the light are left; 0 if more passes all.
+  // Depths of the splats behind which less than 90, 50 and 10 % of the light are left; 0 if all splats together
+  // transmit more.
   depths: vec3f,
   // 1 - transmittance of all splats.
   opacity: f32,
   // Slots of these splats.
   slots: vec3u,
-  // Transmittance of the splats in front of the point's depth.
+  // Transmittance of the splats in front of the depth of the point.
   in_front: f32,
-  // Numbers of these splats among those of all pages, plus 1; 0 until `probe_surface` has found them.
+  // Indices of these splats among those of all blocks, plus 1; 0 until `probe_surface` has found them.
   stored: vec3u,
 }
 

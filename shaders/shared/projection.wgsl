@@ -6,9 +6,9 @@
 #import shared/ellipse
 #import shared/gathered
 
-// Variance that the low-pass filter of 3D Gaussian Splatting adds, in px² of the frame that is shown.
+// Variance that the low-pass filter of 3D Gaussian Splatting adds, in px² of the displayed frame.
 const DILATION = 0.3;
-// Least opacity compensation of an antialiased scene.
+// Minimum opacity compensation of an antialiased scene.
 const COMPENSATION_MIN = 0.005;
 
 fn is_in_depth_range(view: View, depth: f32) -> bool {
@@ -17,14 +17,15 @@ fn is_in_depth_range(view: View, depth: f32) -> bool {
 
 fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
   var p = in_camera(view, g.position);
-  // What `cull` found at the near plane, `project` may find a rounding nearer, and with a plane that is very near at the camera's centre or behind it.
+  // `project` may round a splat that `cull` found at the near plane to less, or even to a depth of zero or below if
+  // that plane is very near.
   p.z = max(p.z, view.near);
-  // What things shrink by.
+  // Divisor of the perspective projection.
   let shrink = select(p.z, 1.0, view.is_orthographic != 0u);
   let xy = p.xy / shrink;
   let t = clamp(xy, view.jacobian_min, view.jacobian_max);
 
-  // Rows of J · W · L, a square root of the screen covariance; its products would lose digits too early.
+  // Rows of J · W · L, a square root of the screen covariance, whose products would lose digits too early.
   let to_camera = mat3x3f(view.local_to_camera[0].xyz, view.local_to_camera[1].xyz, view.local_to_camera[2].xyz);
   let axes = mat3x3f(
     to_camera * g.factor_x,
@@ -39,7 +40,7 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
   let yy = dot(row_y, row_y);
   let variance_x = xx + view.filter_variance;
   let inverse_sigma_x = inverseSqrt(variance_x);
-  // By Cauchy-Binet the determinant before dilation is |row_x × row_y|², a sum of squares: no cancellation.
+  // The determinant before dilation is |row_x × row_y|² (Cauchy-Binet), a sum of squares without cancellation.
   let minors = cross(row_x * inverse_sigma_x, row_y);
   let own_variance_v = dot(minors, minors);
   let variance_v = own_variance_v + view.filter_variance * (variance_x + yy) / variance_x;
@@ -65,7 +66,7 @@ fn half_extent(view: View, e: Ellipse) -> vec2f {
   return radius * vec2f(e.sigma_x, sqrt(sheared * sheared + e.sigma_v * e.sigma_v));
 }
 
-// Columns and rows of the image whose pixel centres lie in the box of the ellipse; 0 in both where there is none.
+// Columns and rows of the image whose pixel centers lie in the box of the ellipse; 0 in both if there are none.
 fn covered_box(view: View, e: Ellipse) -> vec2f {
   let extent = half_extent(view, e);
   let first = max(ceil(e.center - extent - 0.5), vec2f(0.0));
@@ -77,8 +78,8 @@ fn covers_a_pixel(view: View, e: Ellipse) -> bool {
   return covered_box(view, e).x > 0.0;
 }
 
-// Share of the image that a rasterizer visits for an ellipse with this box, in SHARE_UNITs: the quad around it, as far as
-// that lies within the box.
+// Fraction of the image that a rasterizer visits for an ellipse with this box, in SHARE_UNITs: the quad around the
+// ellipse, clipped to the box.
 fn covered_share(view: View, e: Ellipse, box: vec2f) -> u32 {
   let diameter = 2.0 * cutoff_radius(e.opacity);
   let quad = (diameter * e.sigma_x) * (diameter * e.sigma_v);

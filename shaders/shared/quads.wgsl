@@ -11,14 +11,14 @@
 struct RasterView {
   // Pixels.
   viewport: vec2f,
-  // Which part of the splats to draw, counted from the farthest, of how many.
+  // Slice of the splats to draw, counted from the farthest, and the number of slices.
   slice: u32,
   slices: u32,
 }
 
 const NO_SLOT = 0xffffffffu;
 
-// Slot of the splat that a vertex belongs to; NO_SLOT where there is none.
+// Slot of the splat of a vertex, or NO_SLOT if there is none.
 fn slot_of(vertex_index: u32, instance: u32) -> u32 {
   let rank = instance * QUAD_BATCH + vertex_index / 4u;
   let share = (plan.visible + raster.slices - 1u) / raster.slices;

@@ -1,21 +1,22 @@
-// The geometry of Gaussians in 16 bytes, relative to what their chunk is like: packages/renderer/src/streaming/quantized-geometry.ts writes it. In place
-// of shared/stored_gaussian for pages that are stored so.
+// The geometry of Gaussians in 16 bytes, relative to their chunk: packages/renderer/src/streaming/quantized-geometry.ts
+// writes it. Replaces shared/stored_gaussian for blocks in this layout.
 //
-// A chunk takes 258 rows. The first has the origin of its coordinates and the log2 of its least size (float32), the second the steps of both; then each splat has
-//   x  centre: x, y, 16 bits each
-//   y  centre: z, 16 bits; direction of the factor's third row: u, 13 bits; of the second: t, its bits 0 to 2
-//   z  log2 of the lengths of the factor's rows, 10 bits each; t, bits 3 and 4
-//   w  v, 13 bits; opacity, 12 bits; t, bits 5 to 11
+// A chunk takes 258 rows. The first has the origin of its coordinates and the log2 of its smallest size (float32), the
+// second the steps of both; then each splat has
+// x  center: x, y, 16 bits each
+// y  center: z, 16 bits; direction of the factor's third row: u, 13 bits; of the second: t, its bits 0 to 2
+// z  log2 of the lengths of the factor's rows, 10 bits each; t, bits 3 and 4
+// w  v, 13 bits; opacity, 12 bits; t, bits 5 to 11
 #import shared/gaussian
 #import shared/quantized_layout
 
 const QUANTIZED_SIZES = 1023.0;
-// The code of 0, halfway between those of -1 and 1.
+// Code of 0, halfway between the codes of -1 and 1.
 const QUANTIZED_T_ZERO = 2047.0;
 const QUANTIZED_UV_ZERO = 4095.0;
-// Of an opacity of 1; merged splats have up to 2.718.
+// Code of an opacity of 1; merged splats have up to 2.718.
 const QUANTIZED_OPAQUE = 1500.0;
-// Files may hold anything: the log2 of a size, and the bits of a length that squares to a number.
+// Bounds against malformed files: the log2 of a size, and the bits of the largest length whose square is finite.
 const QUANTIZED_LARGEST_SIZE = 40.0;
 const QUANTIZED_FARTHEST = 0x5d000000u;
 
@@ -32,7 +33,7 @@ fn gaussian_at(i: u32) -> FoundGaussian {
   return FoundGaussian(gaussians[first + QUANTIZED_HEAD_ROWS + i % CULL_GROUP], gaussians[first], gaussians[first + 1u]);
 }
 
-// True if nothing that the chunk may hold is beyond all bounds.
+// Whether the header of the chunk is in range, so that no splat of it can be out of bounds.
 fn is_usable(g: FoundGaussian) -> bool {
   let magnitudes = vec4u(0x7fffffffu);
   if (any((g.origin & magnitudes) > vec4u(QUANTIZED_FARTHEST)) || any((g.step & magnitudes) > vec4u(QUANTIZED_FARTHEST))) { return false; }
@@ -49,7 +50,8 @@ fn position_of(g: FoundGaussian) -> vec3f {
 fn unpack_gaussian(g: FoundGaussian) -> Gaussian {
   let codes = vec3u(g.row.z & 1023u, (g.row.z >> 10u) & 1023u, (g.row.z >> 20u) & 1023u);
   let sizes = exp2(bitcast<f32>(g.origin.w) + bitcast<f32>(g.step.w) * vec3f(codes));
-  // Unit vectors with no negative last coordinate, as points of the line |x| + y = 1 and of the plane |x| + |y| + z = 1.
+  // Unit vectors with a non-negative last coordinate, as points of the line |x| + y = 1 and of the plane |x| + |y| + z
+  // = 1.
   let t = f32((g.row.y >> 29u) | ((g.row.z >> 30u) << 3u) | ((g.row.w >> 25u) << 5u)) / QUANTIZED_T_ZERO - 1.0;
   let second = normalize(vec2f(t, max(0.0, 1.0 - abs(t))));
   let uv = vec2f(f32((g.row.y >> 16u) & 0x1fffu), f32(g.row.w & 0x1fffu)) / QUANTIZED_UV_ZERO - 1.0;

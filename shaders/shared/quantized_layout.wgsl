@@ -1,4 +1,4 @@
-// Rows of 16 bytes that a chunk of shared/quantized_gaussian takes, and how many of them come before its splats.
+// Rows of 16 bytes in a chunk of shared/quantized_gaussian, and the number of header rows among them.
 #import shared/group
 
 const QUANTIZED_HEAD_ROWS = 2u;

@@ -1,4 +1,4 @@
-// Sums stop at the largest number: one that wrapped around would look like room for everything.
+// Saturates at the largest number, because a sum that wrapped around would look like free capacity.
 fn add_saturating(a: u32, b: u32) -> u32 {
   let sum = a + b;
   return select(sum, 0xffffffffu, sum < a);

@@ -1,18 +1,18 @@
-// What else is in the picture: meshes that a host has drawn, by their depth alone, or as layers of color among the splats. Stages declare the textures: `stored_depth`, and for
-// layers `layer_color`, `second_depth`, `second_color`; and the uniform `scene`.
+// Meshes that a host has drawn, as depth alone or as layers of color among the splats. Stages declare the textures:
+// `stored_depth`, and for layers `layer_color`, `second_depth`, `second_color`; and the uniform `scene`.
 #import shared/depth_limit
 
-// Layers of color: 0 where the depth just ends the pixel; up to 2.
+// Layers of color, up to 2; 0 if the depth only ends the pixel.
 override layers: u32 = 0u;
 
 struct Layer {
   // Premultiplied; alpha is the coverage of the pixel times the opacity.
   color: vec4f,
-  // Camera depth; NO_LIMIT where there is nothing.
+  // Camera depth; NO_LIMIT if there is no layer.
   depth: f32,
 }
 
-// Texel for a place in the image, in pixels that are drawn.
+// Texel at a position in the image, in drawn pixels.
 fn scene_texel(place: vec2f) -> vec2u { return vec2u(place * scene.scale); }
 
 fn limit_at(texel: vec2u) -> f32 { return depth_limit(scene, textureLoad(stored_depth, texel, 0).r); }

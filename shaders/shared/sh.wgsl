@@ -26,7 +26,7 @@ fn sh_basis(quartet: u32, d: vec3f) -> vec4f {
   }
 }
 
-// How coefficients are stored: SH_PRECISION of the renderer's pack/sh.ts.
+// Storage of coefficients: SH_PRECISION of the renderer's pack/sh.ts.
 const SH_FLOAT16 = 1u;
 
 // Number of 8-byte words that hold the coefficients of one splat.
@@ -36,7 +36,7 @@ fn sh_stride(degree: u32, encoding: u32) -> u32 {
   return 1u + degree * (degree + 1u) / 2u;
 }
 
-// Factor of the codes of a band of int8 coefficients.
+// Scale of the codes of a band of int8 coefficients.
 fn sh_scale(code: u32) -> f32 {
   return select(0.0, exp2(f32(code) / 8.0 - 16.0), code != 0u);
 }

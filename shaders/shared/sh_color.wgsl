@@ -1,7 +1,8 @@
-// Colour of a splat from its spherical harmonics, as pack/sh.ts of the renderer packs them. `view` is the stage's, and so is `sh_word`, which finds them.
+// Color of a splat from its spherical harmonics, in the layout of the renderer's pack/sh.ts. The importing module
+// declares `view`, and `sh_word`, which loads them.
 #import shared/sh
 
-// Colour that four coefficients in three words add, or one coefficient in the last word of degrees 0 and 2.
+// Color contribution of four coefficients in three words, or of one coefficient in the last word of degrees 0 and 2.
 fn quartet_color(first_word: u32, basis: vec4f) -> vec3f {
   let a = sh_word(first_word);
   let b = sh_word(first_word + 1u);
@@ -43,7 +44,7 @@ fn codes_color(a: u32, b: u32, c: u32, weights: vec4f) -> vec3f {
   return weights.x * p.xyz + weights.y * vec3f(p.w, q.xy) + weights.z * vec3f(q.zw, r.x) + weights.w * r.yzw;
 }
 
-// Degree 0 in float16, then codes of 8 bits in the order [coefficient][channel] with a scale for each band.
+// Degree 0 in float16, then 8-bit codes in the order [coefficient][channel] with a scale for each band.
 fn int8_color(first: u32, degree: u32, d: vec3f) -> vec3f {
   let head = sh_word(first);
   var color = SH_C0 * vec3f(unpack2x16float(head.x), unpack2x16float(head.y).x);
@@ -56,7 +57,7 @@ fn int8_color(first: u32, degree: u32, d: vec3f) -> vec3f {
   if (degree == 1u) {
     let rest = unpack4x8snorm(a.y);
     let p = unpack4x8snorm(a.x);
-    // The ninth code is the first behind these eight; splats that have no more than degree 1 have it where others have the scale of band 2.
+    // The ninth code follows these eight; splats of degree 1 have it in place of the scale of band 2.
     var last = unpack4x8snorm(head.y).w;
     if (view.sh_degree > 1u) { last = unpack4x8snorm(sh_word(first + 2u).x).x; }
     return color + scale_1 * (low.y * p.xyz + low.z * vec3f(p.w, rest.xy) + low.w * vec3f(rest.zw, last));
@@ -76,7 +77,7 @@ fn int8_color(first: u32, degree: u32, d: vec3f) -> vec3f {
   return color + codes_color(f.y, g.x, g.y, scale_3 * vec4f(top.yzw, 0.0));
 }
 
-// sRGB-encoded colour of splat i seen along the unit direction d; may exceed 1.
+// sRGB-encoded color of splat i seen along the unit direction d; may exceed 1.
 fn splat_sh_color(i: u32, d: vec3f) -> vec3f {
   let first = i * sh_stride(view.sh_degree, view.sh_encoding);
   let degree = min(view.sh_degree, view.sh_cap);

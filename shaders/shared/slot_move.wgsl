@@ -1,8 +1,8 @@
-// By how much what lies in a slot of a pool is moved.
+// Translation of the contents of one slot of a pool.
 struct SlotMove {
   by: vec3f,
   slot: u32,
 }
 
-// Chunks that a slot has room for.
+// Capacity of a slot in chunks.
 const SLOT_CHUNKS = 4u;

@@ -1,4 +1,4 @@
-// What the three kernels of the radix sort share.
+// Definitions shared by the three kernels of the radix sort.
 struct SortPass {
   // Lowest bit of the digit.
   shift: u32,
@@ -7,7 +7,7 @@ struct SortPass {
 }
 
 const SORT_THREADS = 256u;
-// Values of a digit of 8 bits: one a thread.
+// Number of values of an 8-bit digit: one for each thread.
 const DIGITS = 256u;
 
 fn digit_of(key: u32, shift: u32) -> u32 {

@@ -1,5 +1,5 @@
-// How a block of keys is written. It is put in order in workgroup memory first, so that keys with the same digit, which lie side by side
-// afterwards, are written side by side: written one by one as they come, each would cost a memory transaction of its own.
+// Writes a block of keys. The block is sorted in workgroup memory first, so that keys with the same digit are
+// contiguous and are written together: scattered writes would cost a memory transaction each.
 #import shared/sort_scatter
 #import shared/prefix
 
@@ -7,13 +7,14 @@
 const ITEMS = SORT_BLOCK / SORT_THREADS;
 alias Items = array<u32, ITEMS>;
 
-// What is counted in while keys are ranked; afterwards words on their way from one thread to another.
+// Counters while keys are ranked; afterwards words exchanged between threads.
 var<workgroup> exchange: array<atomic<u32>, SORT_BLOCK>;
-// For each digit the place in the block of the first key that has it, and what leads from a place in the block to that among all keys.
+// For each digit the index in the block of its first key, and the offset from an index in the block to the index among
+// all keys.
 var<workgroup> first_in_block: array<u32, DIGITS>;
 var<workgroup> to_all: array<u32, DIGITS>;
 
-// Takes the number of the block's keys with digit `lane`. Ends with a barrier.
+// `count` is the number of keys in the block with digit `lane`. Ends with a barrier.
 fn find_first_places(block_id: u32, lane: u32, count: u32) {
   let before = inclusive_sum(count, lane, DIGITS) - count;
   let total = digit_totals[lane];
@@ -24,7 +25,8 @@ fn find_first_places(block_id: u32, lane: u32, count: u32) {
   workgroupBarrier();
 }
 
-// Writes keys number first, first + step, ... of the list, whose places in the block are known. A place that a wrong rank leads to is not written.
+// Writes keys number first, first + step, ... of the list, whose places in the block are known. Places out of range,
+// which only a wrong rank produces, are not written.
 fn write_items(block_id: u32, lane: u32, first: u32, step: u32, keys: ptr<function, Items>, places: ptr<function, Items>) {
   let first_of_block = block_id * SORT_BLOCK;
   let length = min(plan.visible - min(first_of_block, plan.visible), SORT_BLOCK);
@@ -41,7 +43,7 @@ fn write_items(block_id: u32, lane: u32, first: u32, step: u32, keys: ptr<functi
     goals[r] = to_all[digit_of(key, digit_pass.shift)] + place;
     if (goals[r] < plan.visible) { keys_out[goals[r]] = key; }
   }
-  // Asked for before the barrier: they are on their way while others get there.
+  // Loads are issued before the barrier, so that they overlap with waiting.
   var own: Items;
   for (var r = 0u; r < ITEMS; r++) {
     let i = first + r * step;
@@ -57,7 +59,7 @@ fn write_items(block_id: u32, lane: u32, first: u32, step: u32, keys: ptr<functi
   }
 }
 
-// Keys number first, first + step, ... of the list, as far as there are any.
+// Keys number first, first + step, ... of the list, up to its end.
 fn items_at(first: u32, step: u32) -> Items {
   var keys: Items;
   for (var r = 0u; r < ITEMS; r++) {

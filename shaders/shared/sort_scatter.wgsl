@@ -1,4 +1,4 @@
-// What all variants of `sort_scatter` read and write.
+// Bindings of all variants of `sort_scatter`.
 #import shared/plan
 #import shared/group
 #import shared/sort
@@ -13,7 +13,7 @@
 @group(0) @binding(6) var<storage, read_write> keys_out: array<u32>;
 @group(0) @binding(7) var<storage, read_write> values_out: array<u32>;
 
-// What moves along with key number i.
+// The value that moves with key number i.
 fn value_of(i: u32) -> u32 {
   if (digit_pass.makes_indices != 0u) { return i; }
   return values_in[i];

@@ -1,4 +1,4 @@
-// A projected splat: what a rasterizer needs, in two words of 16 bytes.
+// A projected splat: the input of the rasterizers, in two words of 16 bytes.
 #import shared/ellipse
 
 struct ProjectedSplat {
@@ -8,14 +8,14 @@ struct ProjectedSplat {
   paint: vec4u,
 }
 
-// Colours above this would overflow a float16 accumulation target.
+// Colors above this would overflow a float16 accumulation target.
 const COLOR_MAX = 16384.0;
 
-// A depth in 16 bits: 10 digits, as float16 has, behind 62 exponents, for scenes may be of any size. These are the bits of 2^-28, the least depth; the greatest is
-// 2^34.
+// A depth in 16 bits: 10 bits of mantissa, as float16 has, and 62 exponents, because scenes have any size. These are
+// the bits of 2^-28, the minimum depth; the maximum is 2^34.
 const DEPTH_FIRST = 0x31800000u;
 const DEPTH_LAST = 0xf7ffu;
-// Codes that would be infinite or no numbers as float16 are passed over: half of what unpacks is blue.
+// Codes that would be infinity or NaN as float16 are skipped, because the other half that unpacks with them is blue.
 const NO_HALF = 0x7c00u;
 const NO_HALVES = 0x400u;
 
@@ -43,7 +43,7 @@ fn splat_color(s: ProjectedSplat) -> vec3f {
   return vec3f(unpack2x16float(s.paint.y), unpack2x16float(s.paint.z).x);
 }
 
-// World units along the camera's axis, to 11 bits.
+// World units along the optical axis, to 11 bits.
 fn splat_depth(s: ProjectedSplat) -> f32 {
   return depth_in(s.paint.z);
 }

@@ -1,5 +1,5 @@
-// How the stages before the rasterizer find a splat of the page at hand. Pages of another geometry have another file in place of this one
-// (shared/quantized_gaussian): scripts/build-shaders.mjs makes both of the same stages.
+// Loads a splat of the current block for the stages before the rasterizer. Blocks with another geometry replace this
+// file (shared/quantized_gaussian): scripts/build-shaders.mjs builds both variants of the same stages.
 #import shared/packed_gaussian
 
 alias StoredGaussian = PackedGaussian;

@@ -1,4 +1,5 @@
-// How the workgroup of a tile finds the pairs of its bin that touch the tile. Whoever imports this has 256 threads and loads a splat by `load_splat`.
+// Lets the workgroup of a tile find the pairs of its bin that touch the tile. The importing module has 256 threads and
+// defines `load_splat`.
 #import shared/bins
 #import shared/coverage
 #import shared/prefix
@@ -8,21 +9,22 @@
 // Slots: bin by bin, in depth order.
 @group(0) @binding(2) var<storage, read> pairs: array<u32>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
-// Which pairs touch which tile: see tile_word.
+// Bits of the pairs that touch each tile: see tile_word.
 @group(0) @binding(4) var<storage, read> tile_bits: array<u32>;
 
 const TILE_THREADS = PREFIX_THREADS;
 
-// The window on the bin's pairs: a bit for each that touches the tile, and the number of these up to the end of each word.
+// A window over the pairs of the bin: one bit for each pair that touches the tile, and their running count at the end
+// of each word.
 var<workgroup> window: array<u32, TILE_THREADS>;
 var<workgroup> found_upto: array<u32, TILE_THREADS>;
 var<workgroup> found: u32;
 
-// How far a tile has come in the list of its bin. The same for all threads.
+// Position of a tile in the list of its bin. The same for all threads.
 struct ListPlace {
   // First and end of the bin's pairs.
   range: vec2u,
-  // First word of the window and the one behind it; pairs found in it, and how many of these are loaded.
+  // First word of the window and the one after it; pairs found in the window, and the number of them already loaded.
   first_word: u32,
   next_word: u32,
   in_window: u32,
@@ -72,7 +74,8 @@ fn found_pair(nth: u32) -> u32 {
   return 32u * word + bit;
 }
 
-// Loads the next splats of the tile, `most` or, at the end of the list, fewer, from as many windows as that takes. Needs a barrier behind it. Returns their number.
+// Loads the next `most` splats of the tile, or fewer at the end of the list, from as many windows as necessary. A
+// barrier must follow. Returns their number.
 fn load_batch(place: ptr<function, ListPlace>, most: u32, tile_in_bin: u32, tile_corner: vec2f, lane: u32) -> u32 {
   var count = 0u;
   while (count < most) {

@@ -1,21 +1,21 @@
-// Whether a splat paints anything.
+// Tests whether a splat contributes to the image.
 #import shared/projection
 #import shared/stored_gaussian
 #import shared/detail
 #import shared/scene_opacity
 
 struct Visible {
-  // In the camera's frame; 0 of a splat that paints nothing.
+  // Camera depth; 0 if the splat is invisible.
   depth: f32,
-  // Share of the image, in SHARE_UNITs.
+  // Fraction of the image, in SHARE_UNITs.
   covered: u32,
 }
 
-// What a splat paints when it is drawn to a share.
+// Depth and coverage of a splat drawn with a weight.
 fn visible_part(found: FoundGaussian, share: f32) -> Visible {
   var g = unpack_gaussian(found);
   g.opacity = shared_opacity(thinned_opacity(g.opacity, view.opacity), share);
-  // The cheap tests first: most splats of a scene fail one of them.
+  // The cheap tests come first, because most splats of a scene fail one of them.
   let depth = in_camera(view, g.position).z;
   if (any(g.position < view.crop_low) || any(g.position > view.crop_high)) { return Visible(0.0, 0u); }
   if (g.opacity < ALPHA_MIN || !is_in_depth_range(view, depth)) { return Visible(0.0, 0u); }

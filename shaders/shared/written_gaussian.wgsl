@@ -1,9 +1,9 @@
-// Gaussians that are written on the GPU, and the bounds of each workgroup of them, which is a chunk.
+// Packs Gaussians that are computed on the GPU, and finds the bounds of each workgroup of them, which is a chunk.
 #import shared/packed_gaussian
 #import shared/falloff
 #import shared/chunk
 
-// Larger than any coordinate that can be drawn; WGSL knows no infinity.
+// Larger than any drawable coordinate, because WGSL has no infinity.
 const BEYOND = 1e30;
 
 // Lower triangular root of a covariance, Σ = L Lᵀ.
@@ -24,11 +24,11 @@ fn ratio(a: f32, b: f32) -> f32 {
   return 0.0;
 }
 
-// The rows of R S made orthogonal one after the other, as pack/factor.ts of the renderer does it, so that needles keep the digits that a covariance would lose.
-// `q` is x, y, z, w, of any length but 0.
+// Orthogonalizes the rows of R S one after the other, as pack/factor.ts of the renderer does, so that needles keep the
+// digits that a covariance would lose. `q` is x, y, z, w, of any length but 0.
 fn factor_of(quaternion: vec4f, scales: vec3f) -> Factor {
   var q = quaternion;
-  // Divided by the largest first: squares of tiny or huge components would leave float32's range.
+  // Divided by the largest first, because squares of tiny or huge components would leave the range of float32.
   let largest = max(max(abs(q.x), abs(q.y)), max(abs(q.z), abs(q.w)));
   if (largest <= 0.0) { return no_factor(); }
   q /= largest;
@@ -50,10 +50,10 @@ fn factor_of(quaternion: vec4f, scales: vec3f) -> Factor {
   return Factor(vec3f(xx, yx, zx), vec2f(yy, zy), length(c - zy * y), true);
 }
 
-// The highest bits of a float32, to the nearest: those that PackedGaussian keeps.
+// Rounds to the highest 22 bits of a float32, which PackedGaussian keeps.
 fn high_22(value: f32) -> u32 { return (bitcast<u32>(value) + 0x200u) >> 10u; }
 
-// 28 of them, on the same side of 1/255 as the opacity: splats below it are not drawn.
+// Rounds to 28 bits, on the same side of 1/255 as the opacity, because splats below it are not drawn.
 fn high_28(opacity: f32) -> u32 {
   let first_visible = (bitcast<u32>(ALPHA_MIN) + 15u) >> 4u;
   let nearest = (bitcast<u32>(opacity) + 8u) >> 4u;
@@ -74,7 +74,7 @@ fn pack_gaussian(position: vec3u, f: Factor, opacity: f32) -> PackedGaussian {
   );
 }
 
-// An extent of 1 and an opacity of 0: in order, and not drawn.
+// A valid Gaussian with extent 1 and opacity 0, which is not drawn.
 fn unseen_gaussian() -> PackedGaussian {
   return PackedGaussian(vec4u(0u, 0u, 0u, bitcast<u32>(1.0)), vec4u(0u));
 }
@@ -89,14 +89,14 @@ fn note_nothing(lane: u32) {
 }
 
 fn note_reach(lane: u32, center: vec3f, factor: Factor, opacity: f32) {
-  // No axis is longer than the factor as a whole. A little more for what packing rounds away.
+  // No axis is longer than the norm of the factor. The margin covers the rounding of packing.
   let longest = 1.001 * length(vec3f(length(factor.x), length(factor.y), factor.z));
   let reach = longest * sqrt(2.0 * log(max(opacity / ALPHA_MIN, 1.0)));
   lows[lane] = vec4f(center, -reach);
   highs[lane] = center;
 }
 
-// Bounds of what all lanes have noted, for lane 0. A chunk without any splat is a box turned inside out, which no camera sees.
+// Bounds of all lanes, for lane 0. A chunk without splats is an inverted box, which is always culled.
 fn chunk_of_group(lane: u32) -> Chunk {
   workgroupBarrier();
   for (var half = CULL_GROUP / 2u; half > 0u; half /= 2u) {

@@ -1,9 +1,9 @@
-// `compose` into a rectangle of a framebuffer, whose rows WebGL counts from below.
+// `compose` into a rectangle of a framebuffer, whose rows WebGL counts from the bottom.
 #import shared/compose
 
 struct Corner {
   @builtin(position) position: vec4f,
-  // Shares of the image, from its upper left corner.
+  // Position as fractions of the image, from its upper left corner.
   @location(0) place: vec2f,
 }
 
@@ -15,6 +15,7 @@ fn vertex(@builtin(vertex_index) i: u32) -> Corner {
 
 @fragment
 fn fragment(corner: Corner) -> @location(0) vec4f {
-  // The rectangle may lie anywhere in the framebuffer: its pixels are counted by interpolation, which is exact to far less than half of one.
+  // The rectangle may lie anywhere in the framebuffer, so its pixels are counted by interpolation, which is exact to
+  // far less than half a pixel.
   return composed(floor(corner.place * (compose.used / compose.scale)) + 0.5);
 }

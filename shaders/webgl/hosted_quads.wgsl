@@ -1,4 +1,4 @@
-// `quads` among what a host has drawn: splats behind its depth are left out, pixel by pixel.
+// `quads` in a frame of a host: splats behind its depth are discarded pixel by pixel.
 #import shared/quad
 #import shared/plan
 #import shared/depth_limit
@@ -12,11 +12,11 @@
 struct HostedView {
   // Pixels.
   viewport: vec2f,
-  // Splats in the order.
+  // Number of splats in the order.
   count: u32,
-  // What is stored where there is nothing.
+  // Clear value of the depth buffer.
   nothing: f32,
-  // The camera's depth in page-local coordinates: see `in_camera`.
+  // The optical axis in block-local coordinates: see `in_camera`.
   axis: vec3f,
   unused: f32,
   eye: vec3f,
@@ -25,9 +25,9 @@ struct HostedView {
   unused_as_well: f32,
   // See SceneDepth.
   inverse: vec4f,
-  // Texels for each pixel that is drawn.
+  // Texels for each drawn pixel.
   scale: vec2f,
-  // Texel of the upper left corner; rows are counted from below.
+  // Texel of the upper left corner; rows are counted from the bottom.
   corner: vec2f,
 }
 

@@ -1,4 +1,5 @@
-// What lies under a point: each fragment of a row walks one run of the splats, as each lane of `probe_depth` does.
+// Finds the splats under a point: each fragment of a row walks one run of the splats, as each lane of `probe_depth`
+// does.
 #import shared/probe
 #import webgl/projected_splats
 #import shared/full_screen
@@ -7,7 +8,7 @@
 
 struct ProbeView {
   point: ProbePoint,
-  // Ranks of the first splat and of the one behind the last, and how many of them make a run.
+  // Ranks of the first splat and of the one after the last, and the length of a run.
   first: u32,
   end: u32,
   run: u32,

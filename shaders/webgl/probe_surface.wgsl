@@ -1,4 +1,4 @@
-// The depths at which splats are densest along the rays of points: a fragment for each splat and point that is asked about.
+// Finds the densest depths of splats along the rays of points: one fragment for each pair of splat and probed point.
 #import shared/densest
 #import shared/stored_gaussian
 #import shared/full_screen

@@ -1,4 +1,4 @@
-// `cull` and `project` in one: a fragment for each splat of the scene. What paints nothing has an opacity of 0.
+// `cull` and `project` in one: one fragment for each splat of the scene. Invisible splats get an opacity of 0.
 #import shared/projection
 #import shared/stored_gaussian
 #import shared/sh_color

@@ -1,4 +1,4 @@
-// The projected splats, and their numbers from near to far.
+// The projected splats, and their indices from near to far.
 #import shared/splat
 #import webgl/texels
 

@@ -1,4 +1,4 @@
-// `rasterize_quads` on what `project` of WebGL has left.
+// `rasterize_quads` on the output of `project` of WebGL.
 #import shared/plain_quad
 #import shared/plan
 #import webgl/projected_splats
@@ -8,7 +8,7 @@
 struct QuadsView {
   // Pixels.
   viewport: vec2f,
-  // Splats in the order.
+  // Number of splats in the order.
   count: u32,
   unused: u32,
 }

@@ -1,4 +1,4 @@
-// WebGL has no buffers that shaders read: arrays lie in textures of this width, row by row.
+// WebGL 2 shaders cannot read buffers, so arrays lie in textures of this width, row by row.
 const DATA_WIDTH = 4096u;
 
 fn texel_of(i: u32) -> vec2u {

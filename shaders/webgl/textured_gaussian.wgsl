@@ -1,4 +1,4 @@
-// In place of shared/stored_gaussian: two texels a splat.
+// Replaces shared/stored_gaussian: two texels for each splat.
 #import shared/packed_gaussian
 #import webgl/texels
 
