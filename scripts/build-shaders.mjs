@@ -17,7 +17,7 @@ const RARE = {
   'budget-shaders': ['detail_allow', 'detail_count'],
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'clip-shaders': ['animate'],
-  'streamed-shaders': ['move_slots', 'note_wishes'],
+  'streamed-shaders': ['move_slots', 'page_feedback'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
   'auxiliary-shaders': ['rasterize_tiles_auxiliary'],
   'probe-shaders': ['probe_depth', 'probe_surface', 'probe_surface_quantized'],

@@ -18,12 +18,12 @@ const options = { threads: 'serial', sort: 'serial', detailFade: 0 } as const;
 const viewFrom = (distance: number): Camera =>
   cameraAt([distance, -2, 0], [0, 0, 0], { width: 96, height: 64, fovXDegrees: 60, near: 0.01 });
 
-/** As in shaders/note_wishes.wgsl: pages are wished for a little before anything of them is drawn. */
+/** As in shaders/page_feedback.wgsl: pages are wished for a little before anything of them is drawn. */
 const SOON = 0.93;
 /** Pages that a view wishes for, by so many times more than it allows. */
-function wished(camera: Camera, times = 1): Set<number> {
+function requested(camera: Camera, times = 1): Set<number> {
   const pages = new Set([0]);
-  rule.wish(camera, times * DETAIL, (page) => pages.add(page));
+  rule.request(camera, times * DETAIL, (page) => pages.add(page));
   return pages;
 }
 
@@ -39,13 +39,13 @@ test('at rest the pages are there that the plain rule names', async () => {
     await drawUntilCalm(scene, renderer, camera, DETAIL);
     const found = residents(scene);
     // float32 may see it differently where a page is just at the limit.
-    const [least, most] = [1.001 * SOON, 0.999 * SOON].map((times) => wished(camera, times));
+    const [least, most] = [1.001 * SOON, 0.999 * SOON].map((times) => requested(camera, times));
     for (const page of least) assert.ok(found.has(page), `${distance}: page ${page} is missing`);
     for (const page of found) assert.ok(most.has(page), `${distance}: page ${page} is not asked for`);
     assert.equal(scene.progress.error, 0);
     [renderer, scene].forEach((owner) => owner.destroy());
   }
-  assert.ok(wished(viewFrom(40)).size < wished(viewFrom(9)).size);
+  assert.ok(requested(viewFrom(40)).size < requested(viewFrom(9)).size);
 });
 
 test('while a camera comes nearer, pages come before it needs them', async (t) => {
@@ -63,7 +63,7 @@ test('while a camera comes nearer, pages come before it needs them', async (t) =
   for (let distance = 60; distance > 15; now += 1000 / 30) {
     distance = Math.max(15, 60 - 0.03 * (now - 1000));
     const camera = viewFrom(distance);
-    for (const page of wished(camera, 0.999 * SOON)) needed.add(page);
+    for (const page of requested(camera, 0.999 * SOON)) needed.add(page);
     renderer.render({ gaussians: scene, camera, target, detail: DETAIL });
     await device.queue.onSubmittedWorkDone();
     await new Promise((resolve) => setTimeout(resolve, 5));
@@ -74,7 +74,7 @@ test('while a camera comes nearer, pages come before it needs them', async (t) =
   // Half a second further, none that would be in vain.
   for (const page of ahead)
     assert.ok(
-      [5, 0.1].some((further) => wished(viewFrom(further), 0.999 * SOON).has(page)),
+      [5, 0.1].some((further) => requested(viewFrom(further), 0.999 * SOON).has(page)),
       `page ${page}`,
     );
   [renderer, scene, target].forEach((owner) => owner.destroy());

@@ -5,9 +5,9 @@ import {
   CapacityMonitor,
   CountBuffers,
   LEAST_CAPACITY,
-  CapacityMemory,
+  CapacityHistory,
   type Capacity,
-  type LookedAt,
+  type SampledFrame,
 } from '@gaussian-splat/renderer/stages';
 
 const MOST = { visible: 4e6, pairs: 50e6 };
@@ -20,26 +20,26 @@ function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonito
     new CountBuffers(device),
     room,
     { least, most: MOST },
-    new CapacityMemory(),
-    (wished) => (current = wished),
+    new CapacityHistory(),
+    (requested) => (current = requested),
   );
   return { monitor, room: () => current };
 }
 
-const picture = (pixels: number, wholePixels: number): LookedAt => ({
+const picture = (pixels: number, wholePixels: number): SampledFrame => ({
   pixels,
   wholePixels,
   isWhole: pixels === wholePixels,
 });
 
 /** As many looks as make buffers shrink. */
-function look(monitor: CapacityMonitor, used: Capacity): void {
+function sample(monitor: CapacityMonitor, used: Capacity): void {
   for (let looks = 0; looks < 4; looks++) monitor.judge(used, false);
 }
 
 test('buffers that are nearly empty shrink, and grow before they are full', () => {
   const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => LEAST_CAPACITY);
-  look(monitor, { visible: 1000, pairs: 5000 });
+  sample(monitor, { visible: 1000, pairs: 5000 });
   assert.deepEqual(room(), { visible: 1250, pairs: LEAST_CAPACITY.pairs });
   monitor.judge({ visible: 1200, pairs: 5000 }, false);
   assert.deepEqual(room(), { visible: 1500, pairs: LEAST_CAPACITY.pairs });
@@ -50,13 +50,13 @@ test('buffers that are nearly empty shrink, and grow before they are full', () =
 test('room that must stay does, and comes back as soon as more of it may', () => {
   let pairs = 1 << 18;
   const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => ({ visible: 4e6, pairs }));
-  look(monitor, { visible: 1000, pairs: 5000 });
+  sample(monitor, { visible: 1000, pairs: 5000 });
   assert.deepEqual(room(), { visible: 4e6, pairs: 1 << 18 });
   // A pair is known to cost less now: before anything overflows there is room for as many as one submission paints.
   pairs = 6e6;
   monitor.judge({ visible: 30_000, pairs: 80_000 }, false);
   assert.deepEqual(room(), { visible: 4e6, pairs: 6e6 });
-  look(monitor, { visible: 30_000, pairs: 80_000 });
+  sample(monitor, { visible: 30_000, pairs: 80_000 });
   assert.deepEqual(room(), { visible: 4e6, pairs: 6e6 });
 });
 
@@ -79,18 +79,18 @@ test('pictures of fewer pixels do not take the room that the whole one at rest n
   const whole = { visible: 3.5e6, pairs: 5e6 };
   const smaller = { visible: 3e6, pairs: 1e6 };
   monitor.isDue(true, picture(4_000_000, 4_000_000));
-  look(monitor, whole);
+  sample(monitor, whole);
   monitor.isDue(true, picture(250_000, 4_000_000));
-  for (let k = 0; k < 10; k++) look(monitor, smaller);
+  for (let k = 0; k < 10; k++) sample(monitor, smaller);
   assert.ok(room().pairs >= whole.pairs, `${room().pairs}`);
   // The element has become smaller: what its picture at rest needed says nothing, but that it was five times as much as in motion.
   monitor.isDue(true, picture(62_500, 1_000_000));
-  for (let k = 0; k < 2; k++) look(monitor, { ...smaller, pairs: 2e5 });
+  for (let k = 0; k < 2; k++) sample(monitor, { ...smaller, pairs: 2e5 });
   assert.equal(room().pairs, 1.25 * 5 * 2e5);
 });
 
 /** What a view needs with so many times as many splats as at first; in motion with levels of detail of half as many. */
-function needAt(view: number, { pixels, isWhole }: LookedAt): Capacity {
+function needAt(view: number, { pixels, isWhole }: SampledFrame): Capacity {
   const visible = view * 1e6 * (isWhole ? 1 : 0.5);
   return { visible, pairs: visible * 2 * (pixels / 4e6) ** 0.3 };
 }
@@ -98,7 +98,7 @@ function needAt(view: number, { pixels, isWhole }: LookedAt): Capacity {
 for (const pixels of [4_000_000, 1_960_000, 250_000]) {
   test(`a camera that comes nearer in pictures of ${pixels} pixels has room for the whole one at any time`, () => {
     const { monitor, room } = watch({ visible: 2e6, pairs: 2.5e6 }, () => LEAST_CAPACITY);
-    const see = (view: number, picture: LookedAt): void => {
+    const see = (view: number, picture: SampledFrame): void => {
       monitor.isDue(true, picture);
       monitor.judge(needAt(view, picture), false);
     };

@@ -108,11 +108,11 @@ test('a file that comes short is refused and fetched again, and a view of bytes 
   const nowhere = new Uint8Array(whole.byteLength).fill(255);
   answers.push(nowhere);
   await assert.rejects(source.fetch(0, signal), { code: 'decode/corrupt' }, 'bounds that are not finite');
-  assert.ok(!source.isAtHand!(0));
+  assert.ok(!source.isCached!(0));
   fetched = 0;
   answers.push(whole.slice(8), padded.subarray(8, 8 + whole.byteLength));
   await assert.rejects(source.fetch(0, signal), { code: 'decode/truncated' });
-  assert.ok(!source.isAtHand!(0));
+  assert.ok(!source.isCached!(0));
   const [{ words }] = await source.fetch(0, signal);
   assert.deepEqual(words, new Uint32Array(whole));
   await source.fetch(0, signal);

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { NONE, Residency, type PageList } from '@gaussian-splat/renderer/stages';
 import { randomSource } from '../support/gpu.js';
-import { pageTree, wishesOf } from '../support/page-tree.js';
+import { pageTree, requestsOf } from '../support/page-tree.js';
 
 const opened = (list: PageList, slots: number): Residency => {
   const residency = new Residency(list, slots);
@@ -24,7 +24,7 @@ function placeAll(residency: Residency): number {
 /** Looks and places until a look asks for nothing more. @returns looks */
 function settle(list: PageList, residency: Residency, share: (page: number) => number): number {
   for (let looks = 1; looks <= 200; looks++) {
-    residency.note(wishesOf(list, (page) => residency.isResident(page), share));
+    residency.note(requestsOf(list, (page) => residency.isResident(page), share));
     if (placeAll(residency) === 0) return looks;
   }
   throw new Error('200 looks at one view, and pages are still exchanged');
@@ -34,42 +34,42 @@ test('missing pages are named in the order of what doing without them costs', ()
   const random = randomSource(3);
   const list = pageTree(600);
   const residency = opened(list, 600);
-  for (let look = 0; look < 20; look++) {
-    const wishes = Float32Array.from({ length: list.count }, () => (random() < 0.3 ? 0 : 10 * random()));
-    residency.note(wishes);
+  for (let sample = 0; sample < 20; sample++) {
+    const requests = Float32Array.from({ length: list.count }, () => (random() < 0.3 ? 0 : 10 * random()));
+    residency.note(requests);
     const isMissing = (page: number): boolean =>
-      wishes[page] > 0 && !residency.isResident(page) && residency.isResident(list.parent[page]);
-    const expected = [...wishes.keys()].filter((page) => page > 0 && isMissing(page)).map((page) => wishes[page]);
+      requests[page] > 0 && !residency.isResident(page) && residency.isResident(list.parent[page]);
+    const expected = [...requests.keys()].filter((page) => page > 0 && isMissing(page)).map((page) => requests[page]);
     const found: number[] = [];
-    const wished: number[] = [];
+    const requested: number[] = [];
     for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
-      found.push(wishes[page]);
-      wished.push(page);
+      found.push(requests[page]);
+      requested.push(page);
     }
     assert.deepEqual(
       found,
       expected.sort((a, b) => b - a),
     );
-    for (const page of wished.slice(0, 20)) assert.ok(residency.begin(page) && residency.settle(page));
+    for (const page of requested.slice(0, 20)) assert.ok(residency.begin(page) && residency.settle(page));
   }
   assert.ok(residency.residents > 200);
 });
 
 test('a page at hand comes before those that are needed up to four times as much, and keeps none of them away where it finds no room', () => {
   const list = pageTree(17);
-  const isAtHand = (page: number): boolean => page === 16;
-  const residency = new Residency(list, 2, isAtHand);
+  const isCached = (page: number): boolean => page === 16;
+  const residency = new Residency(list, 2, isCached);
   residency.begin(0);
   residency.settle(0);
-  const look = (...needs: [page: number, need: number][]): void => {
-    const wishes = new Float32Array(17);
-    for (const [page, need] of needs) wishes[page] = need;
-    residency.note(wishes);
+  const sample = (...needs: [page: number, need: number][]): void => {
+    const requests = new Float32Array(17);
+    for (const [page, need] of needs) requests[page] = need;
+    residency.note(requests);
   };
-  look([1, 5], [16, 1]);
+  sample([1, 5], [16, 1]);
   assert.equal(residency.nextMissing(), 1, 'five times as much');
   assert.ok(residency.begin(1) && residency.settle(1));
-  look([1, 5], [2, 9], [16, 3]);
+  sample([1, 5], [2, 9], [16, 3]);
   assert.equal(residency.nextMissing(), 16);
   assert.equal(residency.begin(16), false, 'what is there is needed more');
   assert.equal(residency.nextMissing(), 2);
@@ -80,12 +80,12 @@ test('with room for all, everything that a view wishes for is there in the end',
   const list = pageTree(3000);
   const residency = opened(list, 3000);
   const looks = settle(list, residency, (page) => (page % 7 === 0 ? 0 : 0.3));
-  const wished = wishesOf(
+  const requested = requestsOf(
     list,
     () => true,
     (page) => (page % 7 === 0 ? 0 : 0.3),
   );
-  wished.forEach((wish, page) => assert.equal(residency.isResident(page), wish > 0, `page ${page}`));
+  requested.forEach((request, page) => assert.equal(residency.isResident(page), request > 0, `page ${page}`));
   assert.ok(looks <= 6, `${looks} looks for a tree of four levels`);
 });
 
@@ -96,7 +96,7 @@ test('a pool that is too small comes to rest, and nothing that is worth much mor
   for (let view = 0; view < 10; view++) {
     const shares = Float32Array.from({ length: list.count }, () => (random() < 0.2 ? 0 : random()));
     settle(list, residency, (page) => shares[page]);
-    const wishes = wishesOf(
+    const requests = requestsOf(
       list,
       (page) => residency.isResident(page),
       (page) => shares[page],
@@ -104,9 +104,9 @@ test('a pool that is too small comes to rest, and nothing that is worth much mor
     const isLeaf = (page: number): boolean =>
       !Array.from(residency.pageIn).some((resident) => list.parent[resident] === page);
     const spare = Math.min(
-      ...[...residency.pageIn].filter((page) => page !== 0 && isLeaf(page)).map((page) => wishes[page]),
+      ...[...residency.pageIn].filter((page) => page !== 0 && isLeaf(page)).map((page) => requests[page]),
     );
-    const lacking = Math.max(...wishes.filter((_, page) => !residency.isResident(page)));
+    const lacking = Math.max(...requests.filter((_, page) => !residency.isResident(page)));
     assert.ok(lacking <= 1.5 * spare, `view ${view}: ${lacking} is missing, ${spare} is there`);
   }
 });
@@ -117,10 +117,10 @@ test('pages on their way are never promised the same slot', () => {
   settle(list, residency, (page) => (page <= 16 ? 0.1 : 0));
   assert.equal(residency.residents, 17);
   // All sixteen leaves may leave for others below one of them, which must stay: fifteen can come.
-  const wishes = new Float32Array(200);
-  [0, 1].forEach((page) => (wishes[page] = 1000));
-  for (let page = 17; page < 33; page++) wishes[page] = 500 - page;
-  residency.note(wishes);
+  const requests = new Float32Array(200);
+  [0, 1].forEach((page) => (requests[page] = 1000));
+  for (let page = 17; page < 33; page++) requests[page] = 500 - page;
+  residency.note(requests);
   const coming: number[] = [];
   for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
     if (residency.begin(page)) coming.push(page);
@@ -129,7 +129,7 @@ test('pages on their way are never promised the same slot', () => {
     coming,
     Array.from({ length: 15 }, (_, k) => 17 + k),
   );
-  const left = coming.reverse().map((page) => residency.settle(page)?.left.map((leaver) => leaver.page)[0]);
+  const left = coming.reverse().map((page) => residency.settle(page)?.left.map((evictee) => evictee.page)[0]);
   assert.equal(new Set(left).size, 15);
   assert.ok(left.every((page) => page !== undefined && page >= 2 && page <= 16));
 });
@@ -143,11 +143,11 @@ function cpuOf(work: () => void): number {
 }
 
 /** CPU milliseconds of a look, the quickest of many, and of a page that takes the place of another, on average, in a full pool whose view changes with every look. */
-function costs(pages: number, slots: number): { look: number; page: number } {
+function costs(pages: number, slots: number): { sample: number; page: number } {
   const list = pageTree(pages);
   const residency = opened(list, slots);
   const view = (k: number): Float32Array =>
-    wishesOf(
+    requestsOf(
       list,
       (page) => residency.isResident(page),
       (page) => ((page + 31 * k) % 3 === 0 ? 0.02 : 0.5),
@@ -157,34 +157,34 @@ function costs(pages: number, slots: number): { look: number; page: number } {
     placeAll(residency);
   }
   assert.equal(residency.residents, slots);
-  let [look, placing, placed] = [Infinity, 0, 0];
+  let [sample, placing, placed] = [Infinity, 0, 0];
   for (let k = 12; k < 42; k++) {
-    const wishes = view(k);
-    look = Math.min(
-      look,
-      cpuOf(() => residency.note(wishes)),
+    const requests = view(k);
+    sample = Math.min(
+      sample,
+      cpuOf(() => residency.note(requests)),
     );
     placing += cpuOf(() => {
       placed += placeAll(residency);
     });
   }
   assert.ok(placed > slots, `only ${placed} pages were exchanged`);
-  return { look, page: placing / placed };
+  return { sample, page: placing / placed };
 }
 
 test('a look and a page cost what their numbers make of it, not their product', () => {
   const [small, large] = [costs(16_750, 4375), costs(67_010, 17_500)];
-  const text = ({ look, page }: typeof small): string =>
-    `${look.toFixed(3)} ms a look, ${(1000 * page).toFixed(1)} µs a page`;
+  const text = ({ sample, page }: typeof small): string =>
+    `${sample.toFixed(3)} ms a look, ${(1000 * page).toFixed(1)} µs a page`;
   console.log(`16,750 pages and 4,375 slots: ${text(small)}; 67,010 and 17,500: ${text(large)}`);
-  assert.ok(large.look < 8 * small.look + 0.5, 'four times the pages, more than eight times the look');
+  assert.ok(large.sample < 8 * small.sample + 0.5, 'four times the pages, more than eight times the look');
   assert.ok(large.page < 3 * small.page + 0.02, 'four times the slots, and no longer a matter of microseconds');
 });
 
 test('of pages that find no room one is tried, and a page that is needed more and must be fetched comes nonetheless', () => {
   const list = pageTree(401, 400);
   const residency = new Residency(list, 11, (page) => page !== 400);
-  const look = (need: (page: number) => number): number[] => {
+  const sample = (need: (page: number) => number): number[] => {
     residency.note(Float32Array.from({ length: list.count }, (_, page) => need(page)));
     const tried: number[] = [];
     for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
@@ -193,10 +193,10 @@ test('of pages that find no room one is tried, and a page that is needed more an
     }
     return tried;
   };
-  look((page) => (page === 0 ? 100 : 0));
-  assert.equal(look((page) => (page <= 10 ? 100 : 0)).length, 10);
+  sample((page) => (page === 0 ? 100 : 0));
+  assert.equal(sample((page) => (page <= 10 ? 100 : 0)).length, 10);
   assert.equal(residency.residents, 11);
-  const tried = look((page) => (page <= 10 ? 100 : page === 400 ? 200 : 101 + page / 1000));
+  const tried = sample((page) => (page <= 10 ? 100 : page === 400 ? 200 : 101 + page / 1000));
   assert.deepEqual(tried, [399, 400]);
   assert.ok(residency.isResident(400));
 });

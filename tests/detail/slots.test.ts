@@ -11,7 +11,7 @@ import {
   type PageList,
 } from '@gaussian-splat/renderer/stages';
 import { randomSource } from '../support/gpu.js';
-import { boxList, wishesOf } from '../support/page-tree.js';
+import { boxList, requestsOf } from '../support/page-tree.js';
 
 /** Boxes of one to four levels, the finest of up to 400 chunks. */
 function randomBoxes(count: number, random: () => number): PageList {
@@ -65,7 +65,7 @@ test('whatever is wished for, comes or fails, pages are there whole or not at al
     const [page] = coming.splice(Math.floor(random() * coming.length), 1);
     if (page === undefined) continue;
     if (random() < 0.2) {
-      residency.giveUp(page);
+      residency.cancel(page);
       continue;
     }
     const before = new Set(residency.pageIn);
@@ -77,7 +77,7 @@ test('whatever is wished for, comes or fails, pages are there whole or not at al
     }
     placed++;
     if (settled.left.length > 1) several++;
-    for (const { page: leaver } of settled.left) assert.ok(before.has(leaver) && !residency.isResident(leaver));
+    for (const { page: evictee } of settled.left) assert.ok(before.has(evictee) && !residency.isResident(evictee));
     most = Math.max(most, check(list, residency));
   }
   console.log(`${placed} placed, ${several} of them for several others, ${refused} refused; ${most} of ${slots} slots`);
@@ -94,7 +94,7 @@ test('a page that does not fit beside what is above it is never sent for, and ke
   const residency = opened(list, 3 + 2 + 7);
   for (let look = 0; look < 4; look++) {
     residency.note(
-      wishesOf(
+      requestsOf(
         list,
         (page) => residency.isResident(page),
         () => 0.9,
@@ -118,7 +118,7 @@ test('a large page for which too little can leave keeps no small one from coming
     [4, 4],
   ]);
   const residency = opened(list, 3 + 5 + 6);
-  const look = (...wishes: number[]): void => residency.note(Float32Array.of(0, ...wishes));
+  const look = (...requests: number[]): void => residency.note(Float32Array.of(0, ...requests));
   look(0, 50, 0);
   assert.ok(residency.nextMissing() === 2 && residency.begin(2) && residency.settle(2));
   // Ten slots: six are empty, and what is in the others is needed nearly as much.
@@ -142,8 +142,8 @@ test('views at rest come to rest in a pool that is too small, and nothing that h
   const residency = opened(list, list.slots[0] + 40);
   for (let view = 0; view < 30; view++) {
     const shares = Float32Array.from({ length: list.count }, () => (random() < 0.2 ? 0 : random()));
-    const wishes = (): Float32Array =>
-      wishesOf(
+    const requests = (): Float32Array =>
+      requestsOf(
         list,
         (page) => residency.isResident(page),
         (page) => shares[page],
@@ -151,15 +151,15 @@ test('views at rest come to rest in a pool that is too small, and nothing that h
     let placed = -1;
     for (let looks = 0; placed !== 0; looks++) {
       assert.ok(looks < 100, `view ${view} never comes to rest`);
-      residency.note(wishes());
+      residency.note(requests());
       placed = 0;
       for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
         if (residency.begin(page) && residency.settle(page)) placed++;
       }
     }
     const left = residency.pageIn.length - check(list, residency);
-    wishes().forEach((wish, page) => {
-      if (wish > 0 && !residency.isResident(page)) assert.ok(list.slots[page] > left, `page ${page} has room`);
+    requests().forEach((request, page) => {
+      if (request > 0 && !residency.isResident(page)) assert.ok(list.slots[page] > left, `page ${page} has room`);
     });
   }
 });
@@ -182,7 +182,7 @@ test('what is under way is bounded in slots, not in pages', async () => {
   const waiting = new Set<number>();
   for (let round = 0; round < 600 && residency.residents < list.count; round++) {
     residency.note(
-      wishesOf(
+      requestsOf(
         list,
         (page) => residency.isResident(page),
         () => 0.5,

@@ -225,7 +225,7 @@ test('whatever is wished for, comes or fails, what is above a page is there, and
       if (residency.begin(page)) coming.push(page);
     }
     const [page] = coming.splice(Math.floor(random() * coming.length), 1);
-    if (page !== undefined && random() < 0.2) residency.giveUp(page);
+    if (page !== undefined && random() < 0.2) residency.cancel(page);
     else if (page !== undefined) residency.settle(page);
     const residents = [...residency.pageIn].filter((resident) => resident !== NONE);
     assert.equal(new Set(residents).size, residents.length);

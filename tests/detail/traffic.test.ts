@@ -15,7 +15,7 @@ import {
   type PageList,
 } from '@gaussian-splat/renderer/stages';
 import { randomSource } from '../support/gpu.js';
-import { pageTree, wishesOf } from '../support/page-tree.js';
+import { pageTree, requestsOf } from '../support/page-tree.js';
 
 interface Fetch {
   readonly page: number;
@@ -75,10 +75,10 @@ function pool(pages: number, slots: number, below = 16, now?: () => number): Poo
     now,
   });
   const look: Pool['look'] = (share) => {
-    const wishes = wishesOf(list, (page) => residency.isResident(page), share);
-    residency.note(wishes);
+    const requests = requestsOf(list, (page) => residency.isResident(page), share);
+    residency.note(requests);
     traffic.follow();
-    return wishes;
+    return requests;
   };
   return { list, residency, traffic, server, errors, arrivals: () => arrivals, look };
 }
@@ -118,8 +118,8 @@ test('a thousand pages that arrive as fast as they are sent for: few are under w
 test('what is sent for is what is needed most of all that can come', () => {
   const all = pool(300, 300);
   const random = randomSource(4);
-  const wishes = all.look(() => random());
-  const expected = [...Array(17).keys()].slice(1).sort((a, b) => wishes[b] - wishes[a]);
+  const requests = all.look(() => random());
+  const expected = [...Array(17).keys()].slice(1).sort((a, b) => requests[b] - requests[a]);
   assert.deepEqual(all.server.log, expected.slice(0, MOST_FETCHES));
 });
 

@@ -258,15 +258,15 @@ test('where all splats of a file take as many coefficients none loses some for n
 
 test('views that show nothing have no say in the figure, and the scene is refused where none shows anything', async () => {
   const [first, second, third] = fewer.heldOut;
-  const lookedAt = (heldOut: Camera[]) => new PaintedEvaluator(scene, { views: { ...fewer, heldOut } });
-  const blind = lookedAt([first, away(second), away(third)]);
+  const sampledAt = (heldOut: Camera[]) => new PaintedEvaluator(scene, { views: { ...fewer, heldOut } });
+  const blind = sampledAt([first, away(second), away(third)]);
   const result = await economise(scene, { minDecibels: 45, name: 'a.glb', evaluator: blind });
   const written = await readScene(result.bytes, { name: 'a.glb' });
   const [before, now] = [await cpuPainter.draw(scene, [first]), await cpuPainter.draw(written, [first])];
   const found = decibels(meanSquare(now[0], before[0]));
   assert.ok(Math.abs(result.decibels - found) < 1e-6, `${result.decibels} dB said, ${found} dB`);
   assert.ok(found >= 45 && result.heldOutViews === 1, `${found} dB in ${result.heldOutViews} view`);
-  const options = { minDecibels: 45, name: 'a.glb', evaluator: lookedAt([away(first), away(second)]) };
+  const options = { minDecibels: 45, name: 'a.glb', evaluator: sampledAt([away(first), away(second)]) };
   await assert.rejects(economise(scene, options), /held-out views: expected views that show some of the scene/);
 });
 

@@ -12,8 +12,8 @@ test('what is asked for however many microtasks after another request is run', a
       const runs: string[] = [];
       const loop = new RunLoop<string>({
         queue,
-        isDue: (wish) => wish !== 'not due',
-        run: (wish) => Promise.resolve(void runs.push(wish)),
+        isDue: (request) => request !== 'not due',
+        run: (request) => Promise.resolve(void runs.push(request)),
         onError: (error) => assert.fail(String(error)),
       });
       loop.request(first);

@@ -1,4 +1,4 @@
-/** The pages of a streamed scene as shaders/note_wishes.wgsl sees them: what doing without each costs a view. */
+/** The pages of a streamed scene as shaders/page_feedback.wgsl sees them: what doing without each costs a view. */
 import { eyeOf, type Camera, type Vector3 } from '@gaussian-splat/core';
 import type { DetailManifest } from '@gaussian-splat/renderer';
 import { DETAIL_NUMBERS, DETAIL_PLACES, listPages, NONE } from '@gaussian-splat/renderer/stages';
@@ -51,7 +51,7 @@ export class FlightPages {
    * Pixels that doing without each page costs a view, those out of view a part of it.
    * @param most gets a page and its pixels, of those that cost more than `allowed`
    */
-  wish(camera: Camera, allowed: number, most: (page: number, pixels: number, isVisible: boolean) => void): void {
+  request(camera: Camera, allowed: number, most: (page: number, pixels: number, isVisible: boolean) => void): void {
     const focal = Math.max(camera.fx, camera.fy);
     const [ex, ey, ez] = eyeOf(camera.worldToCamera);
     const sides = sidesOf(camera);

@@ -129,7 +129,7 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
   });
   const [pace, motion] = [new UploadPace(), new CameraMotion()];
   const rows: FlightSecond[] = [];
-  let look: { readonly wishes: Float32Array; readonly frame: number } | undefined;
+  let look: { readonly requests: Float32Array; readonly frame: number } | undefined;
   let [sum, placed, turned] = [0, 0, 0];
   let before: Camera | undefined;
   const all = Math.round(60 * (options.warm + options.seconds));
@@ -145,13 +145,13 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
     before = camera;
     motion.observe(camera, server.now);
     if (look && frame >= look.frame + READ_BACK) {
-      residency.note(look.wishes);
+      residency.note(look.requests);
       traffic.follow();
       look = undefined;
     }
     if (look === undefined && frame % LOOK === 0) {
       const ahead = options.isStill ? camera : motion.ahead(aheadMs(traffic.arrivalMs));
-      look = { wishes: wishesOf(pages, residency, [camera, ahead]), frame };
+      look = { requests: requestsOf(pages, residency, [camera, ahead]), frame };
     }
     const error = lacking(pages, residency, camera);
     sum += error;
@@ -181,23 +181,23 @@ function upload(
   return placed;
 }
 
-/** Pixels that a view may be off, and from which on pages are wished for: see shaders/note_wishes.wgsl. */
+/** Pixels that a view may be off, and from which on pages are wished for: see shaders/page_feedback.wgsl. */
 const [ALLOWED, SOON] = [1, 0.93];
 
-function wishesOf(pages: FlightPages, residency: Residency, cameras: readonly Camera[]): Float32Array {
+function requestsOf(pages: FlightPages, residency: Residency, cameras: readonly Camera[]): Float32Array {
   const { list } = pages;
-  const wishes = new Float32Array(list.count);
+  const requests = new Float32Array(list.count);
   for (const camera of new Set(cameras)) {
-    pages.wish(camera, SOON, (page, pixels) => {
-      if (pixels > wishes[page] && residency.isResident(list.parent[page])) wishes[page] = pixels;
+    pages.request(camera, SOON, (page, pixels) => {
+      if (pixels > requests[page] && residency.isResident(list.parent[page])) requests[page] = pixels;
     });
   }
-  return wishes;
+  return requests;
 }
 
 function lacking(pages: FlightPages, residency: Residency, camera: Camera): number {
   let most = 0;
-  pages.wish(camera, ALLOWED, (page, pixels, isVisible) => {
+  pages.request(camera, ALLOWED, (page, pixels, isVisible) => {
     if (!isVisible || pixels <= most || residency.isResident(page)) return;
     if (residency.isResident(pages.list.parent[page])) most = pixels;
   });

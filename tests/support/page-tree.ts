@@ -12,7 +12,7 @@ export function pageTree(count: number, below = 16): PageList {
  * Page requests as a view notes them: only for pages whose parent is there, and each page less than its parent.
  * @param share gets a page, returns the share, 0 to 1, of its parent's need that it has
  */
-export function wishesOf(
+export function requestsOf(
   list: PageList,
   isResident: (page: number) => boolean,
   share: (page: number) => number,

@@ -41,13 +41,13 @@ export interface GeneratorOptions extends AcquireOptions {
 /** A model that writes Gaussians. */
 export type GaussianModelFile = GeneratorModel & { readonly layout: GaussianLayout };
 
-interface Wish {
+interface RunRequest {
   readonly state: GeneratorState;
   readonly inputs: readonly Inputs[];
 }
 
 /** The wish of an instance among others of its model. */
-interface InstanceWish {
+interface InstanceRequest {
   readonly state: GeneratorState;
   readonly inputs: Inputs;
 }
@@ -67,9 +67,9 @@ export class Generator {
   sink: GaussianSink | undefined;
   readonly #chain: Chain;
   readonly #options: GeneratorOptions;
-  readonly #runner: RunLoop<Wish> | Seat<InstanceWish>;
-  #shown: Wish['inputs'] | undefined;
-  #asked: Wish | undefined;
+  readonly #runner: RunLoop<RunRequest> | Seat<InstanceRequest>;
+  #shown: RunRequest['inputs'] | undefined;
+  #asked: RunRequest | undefined;
   /** Of the last run. */
   #timeSeconds = 0;
   #runs = 0;
@@ -151,7 +151,7 @@ export class Generator {
     if (this.#asked !== undefined) this.#askFor(this.#asked);
   }
 
-  #askFor({ state, inputs }: Wish): void {
+  #askFor({ state, inputs }: RunRequest): void {
     if (this.#runner instanceof RunLoop) this.#runner.request({ state, inputs });
     else this.#runner.request({ state, inputs: inputs[0] });
   }
@@ -162,17 +162,17 @@ export class Generator {
     this.#chain.release(this.#runner.idle);
   }
 
-  #ownLoop(): RunLoop<Wish> {
-    return new RunLoop<Wish>({
+  #ownLoop(): RunLoop<RunRequest> {
+    return new RunLoop<RunRequest>({
       queue: this.#chain.device.queue,
       isDue: ({ inputs }) => this.#isDue(inputs),
-      run: (wish) => this.#run(wish),
+      run: (request) => this.#run(request),
       onError: (error) => this.#options.onError?.(error),
     });
   }
 
-  #seatOf(session: GeneratorSession): Seat<InstanceWish> {
-    return batchOf(session).join<InstanceWish>({
+  #seatOf(session: GeneratorSession): Seat<InstanceRequest> {
+    return batchOf(session).join<InstanceRequest>({
       isDue: ({ inputs }) => this.#isDue([inputs]),
       take: ({ inputs }, outputs, instance) => this.#take([inputs], outputs, instance),
       onTaken: ({ state }, start) => this.#announce(state, start),
@@ -180,19 +180,19 @@ export class Generator {
     });
   }
 
-  #isDue(inputs: Wish['inputs']): boolean {
+  #isDue(inputs: RunRequest['inputs']): boolean {
     const isShown = this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false;
     return this.sink !== undefined && !isShown;
   }
 
-  #take(inputs: Wish['inputs'], { tensors, rows }: RunOutputs, instance: number): void {
+  #take(inputs: RunRequest['inputs'], { tensors, rows }: RunOutputs, instance: number): void {
     if (this.#runner.isClosed) return;
     this.sink?.ingest(tensors, rows, instance);
     this.#shown = inputs;
     this.#runs++;
   }
 
-  async #run({ state, inputs }: Wish): Promise<void> {
+  async #run({ state, inputs }: RunRequest): Promise<void> {
     const start = performance.now();
     const { timeSeconds = 0 } = state;
     if (timeSeconds < this.#timeSeconds) this.#chain.restart();

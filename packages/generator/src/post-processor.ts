@@ -26,7 +26,7 @@ export interface PostProcessorOptions extends AcquireOptions {
 /** A filter that keeps 0.8 of what it wrote is within 1/1000 of its end after so many runs of one image. */
 const MOST_REPEATS = 32;
 
-interface Wish {
+interface RunRequest {
   readonly inputs: readonly Inputs[];
 }
 
@@ -43,8 +43,8 @@ export class PostProcessor {
   readonly input: ImageInput;
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;
-  readonly #loop: RunLoop<Wish>;
-  #shown: Wish['inputs'] | undefined;
+  readonly #loop: RunLoop<RunRequest>;
+  #shown: RunRequest['inputs'] | undefined;
   /** Runs of the same inputs, of models that keep a state. */
   #repeats = 0;
   #version = 0;
@@ -56,7 +56,7 @@ export class PostProcessor {
     this.#loop = new RunLoop({
       queue: chain.device.queue,
       isDue: ({ inputs }) => !this.#isShown(inputs) || this.isConverging,
-      run: (wish) => this.#run(wish),
+      run: (request) => this.#run(request),
       onError: (error) => this.#options.onError?.(error),
     });
   }
@@ -134,7 +134,7 @@ export class PostProcessor {
     this.#chain.release(this.#loop.idle);
   }
 
-  #isShown(inputs: Wish['inputs']): boolean {
+  #isShown(inputs: RunRequest['inputs']): boolean {
     return this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false;
   }
 
@@ -148,7 +148,7 @@ export class PostProcessor {
     this.#chain.forget();
   }
 
-  #run({ inputs }: Wish): Promise<void> {
+  #run({ inputs }: RunRequest): Promise<void> {
     const { name, dtype } = this.#chain.models.at(-1)!.outputs[0] as { name: string; dtype: FinishedImage['dtype'] };
     return this.#chain.run(inputs, ({ tensors, dims }) => {
       if (this.#loop.isClosed) return;

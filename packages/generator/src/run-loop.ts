@@ -3,26 +3,26 @@ const MAX_IN_FLIGHT = 2;
 /** A run that keeps the GPU for longer than this, ms, is waited for: frames that are drawn meanwhile stand behind it in the queue. */
 const SLOW_RUN_MS = 50;
 
-export interface RunLoopOptions<Wish> {
+export interface RunLoopOptions<RunRequest> {
   readonly queue: GPUQueue;
   /** Whether there is anything to do for a wish. */
-  readonly isDue: (wish: Wish) => boolean;
+  readonly isDue: (request: RunRequest) => boolean;
   /** Fulfils once the work is submitted. */
-  readonly run: (wish: Wish) => Promise<void>;
+  readonly run: (request: RunRequest) => Promise<void>;
   readonly onError: (error: unknown) => void;
 }
 
 /** Runs for what was asked last, as fast as runs finish and never faster: no backlog of calls, and none on the GPU. */
-export class RunLoop<Wish> {
-  readonly #options: RunLoopOptions<Wish>;
+export class RunLoop<RunRequest> {
+  readonly #options: RunLoopOptions<RunRequest>;
   readonly #unfinished: Promise<unknown>[] = [];
-  #wish: Wish | undefined;
+  #request: RunRequest | undefined;
   #running: Promise<void> | undefined;
   #milliseconds: number | undefined;
   #isSlow = false;
   #isClosed = false;
 
-  constructor(options: RunLoopOptions<Wish>) {
+  constructor(options: RunLoopOptions<RunRequest>) {
     this.#options = options;
   }
 
@@ -45,24 +45,24 @@ export class RunLoop<Wish> {
   }
 
   /** Returns at once; a wish that has not started yet is replaced. */
-  request(wish: Wish): void {
+  request(request: RunRequest): void {
     if (this.#isClosed) return;
-    this.#wish = wish;
+    this.#request = request;
     this.#running ??= this.#work();
   }
 
   close(): void {
     this.#isClosed = true;
-    this.#wish = undefined;
+    this.#request = undefined;
   }
 
   async #work(): Promise<void> {
     // So that requests of the same task are one.
     await Promise.resolve();
     try {
-      for (let wish = this.#take(); wish !== undefined; wish = this.#take()) {
+      for (let request = this.#take(); request !== undefined; request = this.#take()) {
         try {
-          await this.#run(wish);
+          await this.#run(request);
         } catch (error) {
           if (!this.#isClosed) this.#options.onError(error);
         }
@@ -73,15 +73,15 @@ export class RunLoop<Wish> {
     }
   }
 
-  #take(): Wish | undefined {
-    const wish = this.#wish;
-    this.#wish = undefined;
-    return wish !== undefined && !this.#isClosed && this.#options.isDue(wish) ? wish : undefined;
+  #take(): RunRequest | undefined {
+    const request = this.#request;
+    this.#request = undefined;
+    return request !== undefined && !this.#isClosed && this.#options.isDue(request) ? request : undefined;
   }
 
-  async #run(wish: Wish): Promise<void> {
+  async #run(request: RunRequest): Promise<void> {
     const start = performance.now();
-    await this.#options.run(wish);
+    await this.#options.run(request);
     if (!this.#isClosed) await this.#waitForRoom(start);
   }
 

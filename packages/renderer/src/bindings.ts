@@ -41,7 +41,7 @@ export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threa
 interface PageBindings {
   readonly splatCount: number;
   /** Of a page of a streamed scene. */
-  readonly wishes?: { readonly of: PageRequests; readonly note: GPUBindGroup };
+  readonly requests?: { readonly of: PageRequests; readonly note: GPUBindGroup };
   readonly reading: ReadingStages;
   readonly cullChunks: GPUBindGroup;
   readonly cull: GPUBindGroup;
@@ -125,16 +125,16 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
     const gaussians = page.geometry;
     const reading = stages.reading(table.readingOf(i));
     const modifiers = table.modifiersOf(i);
-    const wishes = table.wishesOf(i);
+    const requests = table.requestsOf(i);
     // Something must be bound where there are no levels of detail; it is not looked at.
     const details = page.details ?? page.chunks;
     const chunk = { view, visible_bits: visibleBits };
     return {
       reading,
       splatCount: page.count,
-      wishes: wishes && {
-        of: wishes,
-        note: wishes.bind({ view, chunks: page.chunks, details, chunk_shares: chunkShares }),
+      requests: requests && {
+        of: requests,
+        note: requests.bind({ view, chunks: page.chunks, details, chunk_shares: chunkShares }),
       },
       cullChunks: reading.cullChunks.bind({
         ...{ ...chunk, ...modifiers },

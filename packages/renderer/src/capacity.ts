@@ -1,4 +1,4 @@
-import type { Capacity, CapacityMemory, LookedAt } from './capacity-memory.js';
+import type { Capacity, CapacityHistory, SampledFrame } from './capacity-history.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { copyCounts } from './copy-counts.js';
 import { constants } from './generated/shaders.js';
@@ -92,35 +92,35 @@ export class CapacityMonitor {
   readonly #buffers: CountBuffers;
   readonly #staging: GPUBuffer;
   readonly #bounds: CapacityBounds;
-  readonly #onWish: (capacity: Capacity, overflowed: boolean) => void;
-  readonly #memory: CapacityMemory;
+  readonly #onResize: (capacity: Capacity, overflowed: boolean) => void;
+  readonly #memory: CapacityHistory;
   #capacity: Capacity;
   #frame = 0;
   /** The last picture that was drawn, the last that was looked at, and when that was. */
-  #drawn: LookedAt = { pixels: 0, wholePixels: 0, isWhole: true };
+  #drawn: SampledFrame = { pixels: 0, wholePixels: 0, isWhole: true };
   #picture = this.#drawn;
-  #lookedAt = -Infinity;
+  #sampledAt = -Infinity;
   #isReading = false;
   #isDestroyed = false;
-  #idleLooks = 0;
+  #idleSamples = 0;
   #recent: Capacity = { visible: 0, pairs: 0 };
 
   /**
    * @param buffers what its counts are read from
    * @param memory what monitors before this one have learnt about the scene
-   * @param onWish called with the room that the next frame should have
+   * @param onResize called with the room that the next frame should have
    */
   constructor(
     buffers: CountBuffers,
     capacity: Capacity,
     bounds: CapacityBounds,
-    memory: CapacityMemory,
-    onWish: (capacity: Capacity, overflowed: boolean) => void,
+    memory: CapacityHistory,
+    onResize: (capacity: Capacity, overflowed: boolean) => void,
   ) {
     this.#memory = memory;
     this.#capacity = capacity;
     this.#bounds = bounds;
-    this.#onWish = onWish;
+    this.#onResize = onResize;
     this.#buffers = buffers;
     this.#staging = buffers.take();
   }
@@ -131,17 +131,17 @@ export class CapacityMonitor {
    * @param picture which it is: one of another size needs another room, and at rest no other follows
    * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
    */
-  isDue(isOpen: boolean, picture: LookedAt): boolean {
+  isDue(isOpen: boolean, picture: SampledFrame): boolean {
     const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !isOpen;
     this.#drawn = picture;
     this.#frame++;
     const isInTurn =
       this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
     const now = performance.now();
-    const isDue = isInTurn || !isAlike(picture, this.#picture) || now - this.#lookedAt > LONGEST_PAUSE_MS;
+    const isDue = isInTurn || !isAlike(picture, this.#picture) || now - this.#sampledAt > LONGEST_PAUSE_MS;
     if (!isDue || hasRoom || this.#isReading) return false;
     this.#picture = picture;
-    this.#lookedAt = now;
+    this.#sampledAt = now;
     return true;
   }
 
@@ -198,14 +198,14 @@ export class CapacityMonitor {
     };
     if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
       this.#memory.grow();
-      this.#wish(grown, overflowed);
+      this.#resize(grown, overflowed);
       return;
     }
     this.#recent = {
       visible: Math.max(this.#recent.visible, need.visible),
       pairs: Math.max(this.#recent.pairs, need.pairs),
     };
-    if (++this.#idleLooks < this.#memory.looks) return;
+    if (++this.#idleSamples < this.#memory.looks) return;
     // Estimates are low where the view came nearer meanwhile.
     const whole = this.#memory.wholeNeed(picture.wholePixels);
     const shrunk = {
@@ -214,19 +214,19 @@ export class CapacityMonitor {
     };
     if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) {
       this.#memory.shrink();
-      this.#wish(shrunk, false);
+      this.#resize(shrunk, false);
     }
-    this.#idleLooks = 0;
+    this.#idleSamples = 0;
     this.#recent = { visible: 0, pairs: 0 };
   }
 
-  #wish(capacity: Capacity, overflowed: boolean): void {
+  #resize(capacity: Capacity, overflowed: boolean): void {
     this.#capacity = capacity;
-    this.#onWish(capacity, overflowed);
+    this.#onResize(capacity, overflowed);
   }
 }
 
-const isAlike = (a: LookedAt, b: LookedAt): boolean => a.pixels === b.pixels && a.isWhole === b.isWhole;
+const isAlike = (a: SampledFrame, b: SampledFrame): boolean => a.pixels === b.pixels && a.isWhole === b.isWhole;
 
 const grow = (used: number, room: number, most: number): number =>
   used > FULL * room ? Math.max(room, Math.min(most, Math.ceil(used * HEADROOM))) : room;

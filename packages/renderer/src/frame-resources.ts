@@ -1,5 +1,5 @@
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityMemory, type Capacity } from './capacity-memory.js';
+import { CapacityHistory, type Capacity } from './capacity-history.js';
 import { CapacityMonitor, CountBuffers, initialCapacity, LEAST_CAPACITY } from './capacity.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
@@ -38,7 +38,7 @@ export class FrameResources {
   #current: Resources | undefined;
   #counts: CountBuffers | undefined;
   #capacity: Capacity | undefined;
-  #memory = new CapacityMemory();
+  #memory = new CapacityHistory();
   #hasOtherPairs = false;
   /** What the rasterizer was last bound to, of what may be replaced. */
   #boundPlan: GPUBuffer | undefined;
@@ -81,7 +81,7 @@ export class FrameResources {
     if (current) return this.#layAnew(current);
     const table = new PageTable(this.#device, world);
     this.#capacity = this.#firstFor(table);
-    this.#memory = new CapacityMemory();
+    this.#memory = new CapacityHistory();
     return this.#rebind(table);
   }
 
@@ -102,7 +102,7 @@ export class FrameResources {
       pairs: isEnough(now.pairs, pairs) ? now.pairs : pairs,
     };
     this.#hasOtherPairs = this.#capacity.pairs !== now.pairs;
-    this.#memory = new CapacityMemory();
+    this.#memory = new CapacityHistory();
     return this.#rebind(table);
   }
 
@@ -195,9 +195,9 @@ export class FrameResources {
     const bounds = { least: () => this.#leastFor(table), most: this.#mostFor(table) };
     this.#current?.monitor.destroy();
     this.#counts ??= new CountBuffers(this.#device);
-    return new CapacityMonitor(this.#counts, capacity, bounds, this.#memory, (wished, overflowed) => {
-      this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
-      this.#capacity = wished;
+    return new CapacityMonitor(this.#counts, capacity, bounds, this.#memory, (requested, overflowed) => {
+      this.#hasOtherPairs = requested.pairs !== this.#capacity?.pairs;
+      this.#capacity = requested;
       if (overflowed) this.#options.onIncomplete();
     });
   }

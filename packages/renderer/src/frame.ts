@@ -1,6 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings, Stages } from './bindings.js';
-import type { PageRequests, WishLevers } from './gaussian-scene.js';
+import type { PageRequests, FeedbackSettings } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { RenderSettings } from './render-settings.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
@@ -12,7 +12,7 @@ export interface Frame {
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
   readonly camera: Camera;
-  readonly levers: WishLevers & Pick<RenderSettings, 'depthKeyBits'>;
+  readonly levers: FeedbackSettings & Pick<RenderSettings, 'depthKeyBits'>;
   /** Whether {@link Scratch.survivors} is to list the numbers of the visible splats by slot, for auxiliary outputs. */
   readonly keepsSurvivors: boolean;
   /** Whether a page has levels of detail. */
@@ -33,8 +33,8 @@ export interface Frame {
  */
 export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): PageRequests[] {
   const { scratch, bindings, timer } = frame;
-  const wishes = wishesDue(frame);
-  for (const wish of wishes) wish.begin(encoder);
+  const requests = feedbackDue(frame);
+  for (const request of requests) request.begin(encoder);
   encoder.clearBuffer(scratch.gathered);
   if (frame.isBudgeted) encoder.clearBuffer(scratch.detailCounts);
   // What the last budget allowed.
@@ -47,12 +47,12 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
     reading.project.record(pass, project, Math.min(scratch.capacity, splatCount));
   }
   frame.order?.recordDepths(pass, bindings);
-  noteWishes(pass, frame, wishes);
+  recordFeedback(pass, frame, requests);
   pass.end();
   if (frame.keepsSurvivors) scratch.keepSurvivors(encoder);
   if (frame.keepsDepths) scratch.keepDepths(encoder);
   sort(encoder, frame);
-  return wishes;
+  return requests;
 }
 
 /** Finds the error on screen that leaves as many splats as the frame may look at. */
@@ -63,14 +63,14 @@ function keepWithinBudget(pass: GPUComputePassEncoder, { pages, budget }: FrameB
 }
 
 /** Streamed scenes that want to know now which pages the view asks for. */
-function wishesDue({ bindings, camera, levers }: Frame): PageRequests[] {
-  const all = new Set(bindings.pages.flatMap(({ wishes }) => (wishes ? [wishes.of] : [])));
-  return [...all].filter((wishes) => wishes.isDue(camera, levers));
+function feedbackDue({ bindings, camera, levers }: Frame): PageRequests[] {
+  const all = new Set(bindings.pages.flatMap(({ requests }) => (requests ? [requests.of] : [])));
+  return [...all].filter((requests) => requests.isDue(camera, levers));
 }
 
-function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly PageRequests[]): void {
-  for (const { wishes, splatCount } of bindings.pages) {
-    if (wishes && due.includes(wishes.of)) wishes.of.note(pass, wishes.note, splatCount);
+function recordFeedback(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly PageRequests[]): void {
+  for (const { requests, splatCount } of bindings.pages) {
+    if (requests && due.includes(requests.of)) requests.of.note(pass, requests.note, splatCount);
   }
 }
 

@@ -21,17 +21,17 @@ export interface GaussianPage {
 }
 
 /** What {@link PageRequests} are noted from: a view, and of a page of the pool what lies there. */
-export type NotedPage = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
+export type FeedbackInputs = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
 
 /** Settings that say which pages a view asks for. */
-export type WishLevers = Pick<RenderSettings, 'detail' | 'detailFade' | 'splatBudget'>;
+export type FeedbackSettings = Pick<RenderSettings, 'detail' | 'detailFade' | 'splatBudget'>;
 
 /** Carries the pages that a view asks for from a frame to the code that fetches them. Streamed scenes bring their own, so that no other page loads it. */
 export interface PageRequests {
   /** Binds a page of the pool, for {@link PageRequests.note}. */
-  bind(page: NotedPage): GPUBindGroup;
+  bind(page: FeedbackInputs): GPUBindGroup;
   /** Called with the camera and the settings of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
-  isDue(camera: Camera, levers: WishLevers): boolean;
+  isDue(camera: Camera, levers: FeedbackSettings): boolean;
   begin(encoder: GPUCommandEncoder): void;
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
   copy(encoder: GPUCommandEncoder): void;

@@ -80,7 +80,7 @@ export class PageTable {
   }
 
   /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
-  wishesOf(page: number): PageRequests | undefined {
+  requestsOf(page: number): PageRequests | undefined {
     return this.#placementOf[page].scene.pageRequests;
   }
 

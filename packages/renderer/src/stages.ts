@@ -1,6 +1,6 @@
 /** The stages one by one, for tests and for those who build a pipeline of their own. */
 export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
-export { CapacityMemory, type Capacity, type LookedAt } from './capacity-memory.js';
+export { CapacityHistory, type Capacity, type SampledFrame } from './capacity-history.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
 export { ROUNDS } from './choice/search.js';
 export { probeDepthStage } from './depth-probe.js';

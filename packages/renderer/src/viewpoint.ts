@@ -64,7 +64,7 @@ interface Encoded {
   readonly isWatched: boolean;
   readonly submissions: Submissions;
   /** Pages that streamed scenes ask for are to be read. */
-  readonly wishes: readonly PageRequests[];
+  readonly requests: readonly PageRequests[];
   readonly resources: Resources;
 }
 
@@ -190,9 +190,9 @@ export class Viewpoint {
     const { timer } = picture;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const encoded = this.#encode(encoder, camera, picture, settings, true);
-    const { last, isWatched, submissions, wishes, resources } = encoded;
+    const { last, isWatched, submissions, requests, resources } = encoded;
     timer?.endFrame?.(last);
-    for (const wish of wishes) wish.copy(last);
+    for (const request of requests) request.copy(last);
     if (isWatched) this.#watch(last, resources);
     this.#submit(last, submissions);
     timer?.submitted?.();
@@ -203,7 +203,7 @@ export class Viewpoint {
         counts.then((painted) => painted?.pairs),
       );
     }
-    for (const wish of wishes) wish.read();
+    for (const request of requests) request.read();
   }
 
   /**
@@ -223,7 +223,7 @@ export class Viewpoint {
    */
   record(encoder: GPUCommandEncoder, camera: Camera, picture: FrameTarget, settings = this.#settings): void {
     const encoded = this.#encode(encoder, camera, { ...picture, timer: undefined }, settings, false);
-    if (encoded.isWatched || encoded.wishes.length > 0) setTimeout(() => this.#readLater(encoded));
+    if (encoded.isWatched || encoded.requests.length > 0) setTimeout(() => this.#readLater(encoded));
   }
 
   /** Records a frame. @param mayDivide whether it may be handed over in parts */
@@ -256,7 +256,7 @@ export class Viewpoint {
     timer?.startFrame();
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
     table.look(drawn, pixelArea, levers, picture.filter, this.#overdraw?.mostFor(table.splats));
-    const wishes = recordProjection(encoder, {
+    const requests = recordProjection(encoder, {
       stages,
       bindings,
       scratch,
@@ -281,7 +281,7 @@ export class Viewpoint {
     const how = { levers, timer, ...this.#wayToPaint(picture, levers, drawn, scratch, order) };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);
     this.#last = { stages, bindings, scale: drawn.width / camera.width };
-    return { last, isWatched, submissions, wishes, resources };
+    return { last, isWatched, submissions, requests, resources };
   }
 
   #watch(encoder: GPUCommandEncoder, { monitor, scratch }: Resources): void {
@@ -296,14 +296,14 @@ export class Viewpoint {
   }
 
   /** Reads what a frame left that a host has submitted. */
-  #readLater({ resources, isWatched, wishes }: Encoded): void {
+  #readLater({ resources, isWatched, requests }: Encoded): void {
     if (this.#engine.resources.current !== resources) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
-    for (const wish of wishes) wish.copy(encoder);
+    for (const request of requests) request.copy(encoder);
     if (isWatched) this.#watch(encoder, resources);
     this.#device.queue.submit([encoder.finish()]);
     if (isWatched) void this.#read(resources);
-    for (const wish of wishes) wish.read();
+    for (const request of requests) request.read();
   }
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */

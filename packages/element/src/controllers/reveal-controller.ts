@@ -13,7 +13,7 @@ export class RevealController {
   readonly #host: ReactiveControllerHost;
   readonly #of: RevealHost;
   /** What was asked for by a method or a click; until then the attribute decides. */
-  #wish: 'dismissed' | 'shown' | undefined;
+  #requested: 'dismissed' | 'shown' | undefined;
   #wasCovered = true;
 
   constructor(host: ReactiveControllerHost, of: RevealHost) {
@@ -23,7 +23,7 @@ export class RevealController {
 
   /** The scene may be seen; a lazy one may therefore be loaded. */
   get mayReveal(): boolean {
-    return this.#wish === undefined ? this.#of.attributes.reveal === 'auto' : this.#wish === 'dismissed';
+    return this.#requested === undefined ? this.#of.attributes.reveal === 'auto' : this.#requested === 'dismissed';
   }
 
   /** The poster covers the scene. */
@@ -32,12 +32,12 @@ export class RevealController {
   }
 
   dismiss(): void {
-    this.#wish = 'dismissed';
+    this.#requested = 'dismissed';
     this.#host.requestUpdate();
   }
 
   cover(): void {
-    this.#wish = 'shown';
+    this.#requested = 'shown';
     this.#host.requestUpdate();
   }
 

@@ -21,18 +21,18 @@ export function endOfTask(): Promise<void> {
 }
 
 /** What an instance asks for. */
-interface Wish {
+interface RunRequest {
   readonly inputs: Inputs;
 }
 
 /** One instance, as a batch sees it. */
-export interface BatchMember<W extends Wish> {
+export interface BatchMember<W extends RunRequest> {
   /** Whether there is anything to do for a wish. */
-  readonly isDue: (wish: W) => boolean;
+  readonly isDue: (request: W) => boolean;
   /** Takes what a run wrote; `instance` says which of its instances is this one. It must submit its work before it returns. */
-  readonly take: (wish: W, outputs: RunOutputs, instance: number) => void;
+  readonly take: (request: W, outputs: RunOutputs, instance: number) => void;
   /** The run is submitted; it started at `start`, as `performance.now()` has it. */
-  readonly onTaken: (wish: W, start: number) => void;
+  readonly onTaken: (request: W, start: number) => void;
   readonly onError: (error: unknown) => void;
 }
 
@@ -53,7 +53,7 @@ export class Batch {
   readonly #session: GeneratorSession;
   readonly #varying: ReadonlySet<string>;
   readonly #steps: StepSessions;
-  readonly #seats = new Set<Seat<Wish>>();
+  readonly #seats = new Set<Seat<RunRequest>>();
   readonly #loop: RunLoop<true>;
 
   constructor(session: GeneratorSession) {
@@ -75,16 +75,16 @@ export class Batch {
   }
 
   /** Adds an instance. */
-  join<W extends Wish>(member: BatchMember<W>): Seat<W> {
+  join<W extends RunRequest>(member: BatchMember<W>): Seat<W> {
     const seat = new Seat(this, member, {
       ask: () => this.#loop.request(true),
-      leave: () => this.#leave(seat as unknown as Seat<Wish>),
+      leave: () => this.#leave(seat as unknown as Seat<RunRequest>),
     });
-    this.#seats.add(seat as unknown as Seat<Wish>);
+    this.#seats.add(seat as unknown as Seat<RunRequest>);
     return seat;
   }
 
-  #leave(seat: Seat<Wish>): void {
+  #leave(seat: Seat<RunRequest>): void {
     this.#seats.delete(seat);
     if (this.#seats.size > 0) return;
     this.#loop.close();
@@ -93,13 +93,13 @@ export class Batch {
     void this.#loop.idle.then(() => this.#steps.release());
   }
 
-  #due(): Seat<Wish>[] {
+  #due(): Seat<RunRequest>[] {
     return [...this.#seats].filter((seat) => seat.isDue);
   }
 
   async #run(): Promise<void> {
     await endOfTask();
-    const asked = this.#due().map((seat) => ({ seat, wish: seat.takeWish()!, inputs: seat.inputs }));
+    const asked = this.#due().map((seat) => ({ seat, request: seat.takeRequest()!, inputs: seat.inputs }));
     try {
       for (const group of groupInstances(asked, this.#varying, this.#steps.most)) await this.#runGroup(group);
     } finally {
@@ -107,10 +107,10 @@ export class Batch {
     }
   }
 
-  async #runGroup(group: readonly { seat: Seat<Wish>; wish: Wish; inputs: Inputs }[]): Promise<void> {
+  async #runGroup(group: readonly { seat: Seat<RunRequest>; request: RunRequest; inputs: Inputs }[]): Promise<void> {
     const start = performance.now();
-    const failed = new Set<Seat<Wish>>();
-    const fail = (seat: Seat<Wish>, error: unknown): void => {
+    const failed = new Set<Seat<RunRequest>>();
+    const fail = (seat: Seat<RunRequest>, error: unknown): void => {
       failed.add(seat);
       if (!seat.isClosed) seat.member.onError(error);
     };
@@ -122,10 +122,10 @@ export class Batch {
         count,
       );
       await session.run(inputs, (outputs) => {
-        group.forEach(({ seat, wish }, instance) => {
+        group.forEach(({ seat, request }, instance) => {
           if (seat.isClosed) return;
           try {
-            seat.member.take(wish, outputs, instance);
+            seat.member.take(request, outputs, instance);
           } catch (error) {
             // What one cannot take is nothing to the others.
             fail(seat, error);
@@ -135,16 +135,16 @@ export class Batch {
     } catch (error) {
       for (const { seat } of group) fail(seat, error);
     }
-    for (const { seat, wish } of group) if (!seat.isClosed && !failed.has(seat)) seat.member.onTaken(wish, start);
+    for (const { seat, request } of group) if (!seat.isClosed && !failed.has(seat)) seat.member.onTaken(request, start);
   }
 }
 
 /** The place of one instance in a batch; asked like a {@link RunLoop} of its own. */
-export class Seat<W extends Wish> {
+export class Seat<W extends RunRequest> {
   readonly member: BatchMember<W>;
   readonly #batch: Batch;
   readonly #calls: { readonly ask: () => void; readonly leave: () => void };
-  #wish: W | undefined;
+  #request: W | undefined;
   #taken: W | undefined;
   #isRunning = false;
   #isClosed = false;
@@ -173,7 +173,7 @@ export class Seat<W extends Wish> {
 
   /** True if there is a wish, and anything to do for it. */
   get isDue(): boolean {
-    return this.#wish !== undefined && this.member.isDue(this.#wish);
+    return this.#request !== undefined && this.member.isDue(this.#request);
   }
 
   /** Inputs of the wish that was taken last. */
@@ -182,16 +182,16 @@ export class Seat<W extends Wish> {
   }
 
   /** Returns at once; a wish that has not started yet is replaced. */
-  request(wish: W): void {
+  request(request: W): void {
     if (this.#isClosed) return;
-    this.#wish = wish;
+    this.#request = request;
     this.#calls.ask();
   }
 
   /** The run of what it returns is on its way until {@link settle}. */
-  takeWish(): W | undefined {
-    this.#taken = this.#wish;
-    this.#wish = undefined;
+  takeRequest(): W | undefined {
+    this.#taken = this.#request;
+    this.#request = undefined;
     this.#isRunning = true;
     return this.#taken;
   }
@@ -206,7 +206,7 @@ export class Seat<W extends Wish> {
   close(): void {
     if (this.#isClosed) return;
     this.#isClosed = true;
-    this.#wish = undefined;
+    this.#request = undefined;
     if (!this.#isRunning) this.settle();
     this.#calls.leave();
   }

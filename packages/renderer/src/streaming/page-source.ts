@@ -20,7 +20,7 @@ export interface PageSource {
    */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<readonly SlotWords[]>;
   /** True for a page that need not be fetched: it is placed before others that are needed as much. */
-  readonly isAtHand?: (page: number) => boolean;
+  readonly isCached?: (page: number) => boolean;
   /** World units by which a page stands elsewhere than its words say. Default: none. */
   readonly translate?: (page: number) => Vector3;
 }
@@ -71,8 +71,8 @@ export function folderSource(manifest: DetailManifest, fetchPage: FetchPage, isD
     signal.throwIfAborted();
     return [{ words: new Uint32Array(bytes), of: file.chunks, first, chunks }];
   };
-  const isAtHand = (page: number): boolean => kept.has(list.place(page).file.file);
-  return { scene: manifest, list, fetch, isAtHand, translate: list.translate };
+  const isCached = (page: number): boolean => kept.has(list.place(page).file.file);
+  return { scene: manifest, list, fetch, isCached, translate: list.translate };
 }
 
 const loadDecoder = (): Promise<typeof decoder> =>

@@ -82,7 +82,7 @@ export class PageTraffic<Words> {
   follow(): void {
     this.#order = undefined;
     for (const page of [...this.#fetching.keys(), ...this.#waiting.keys()]) {
-      if (this.#residency.isForgotten(page)) this.#abandon(page);
+      if (this.#residency.isStale(page)) this.#abandon(page);
     }
     this.sendForMore();
   }
@@ -150,7 +150,7 @@ export class PageTraffic<Words> {
 
   /** Sends for what the last look wished for, whatever has been tried since. */
   #askAnew(): void {
-    this.#residency.relist();
+    this.#residency.rebuildMissing();
     this.sendForMore();
   }
 
@@ -166,7 +166,7 @@ export class PageTraffic<Words> {
     this.#waiting.delete(page);
     this.#sentAt.delete(page);
     this.#slotsUnderWay -= this.#residency.slotsFor(page);
-    this.#residency.giveUp(page);
+    this.#residency.cancel(page);
     this.#abandoned++;
   }
 
@@ -186,7 +186,7 @@ export class PageTraffic<Words> {
     } catch (error) {
       if (isOver()) return;
       this.#slotsUnderWay -= this.#residency.slotsFor(page);
-      this.#residency.giveUp(page);
+      this.#residency.cancel(page);
       this.#sentAt.delete(page);
       this.#noteFailure(page, error);
     }

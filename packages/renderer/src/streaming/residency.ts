@@ -7,7 +7,7 @@ const WORTH = 1.5;
 /** How many times sooner than by its need a page is sent for that need not be fetched. */
 const AT_HAND = 4;
 /** Looks in a row that must not wish for a page on its way before it is given up: views that look in turn wish for different pages. */
-const PATIENCE = 2;
+const STALE_AFTER = 2;
 
 /**
  * Which pages are in which slots, and which should come and go. The chunks above a page are there as long as the page is: pages come from the coarse to the fine
@@ -19,10 +19,10 @@ const PATIENCE = 2;
 export class Residency {
   readonly #slots: PageSlots;
   readonly #list: PageList;
-  readonly #isAtHand: (page: number) => boolean;
+  readonly #isCached: (page: number) => boolean;
   /** [P] pixels that doing without a page would cost, when last looked, and at which look it was last wished for. */
-  readonly #wish: Float32Array;
-  readonly #wishedAt: Uint32Array;
+  readonly #request: Float32Array;
+  readonly #requestedAt: Uint32Array;
   /** [P] pages below a page that are there or on their way. */
   readonly #below: Uint32Array;
   /** [P] 1 for those that have no room beside all that is above them. */
@@ -30,30 +30,30 @@ export class Residency {
   readonly #coming = new Set<number>();
   readonly #missing: RankedHeap;
   /** Pages that may leave, those that can best be spared first. */
-  readonly #leavers: RankedHeap;
+  readonly #evictees: RankedHeap;
   /** [P] 1 for those that are among the leavers or set aside. */
   readonly #isListed: Uint8Array;
   /** Pages that will leave for those on their way that find no empty slot, in the order in which they will; drawn until then. */
-  #setAside: number[] = [];
+  #reserved: number[] = [];
   /** Slots of those, and of pages on their way. */
   #slotsAside = 0;
   #slotsComing = 0;
   /** The last look has found no room for a page of so many slots that was needed so much. */
   #noRoom = { slots: Infinity, need: 0 };
-  #look = 0;
+  #sample = 0;
 
-  /** @param isAtHand true for a page that need not be fetched */
-  constructor(list: PageList, slots: number, isAtHand: (page: number) => boolean = () => false) {
+  /** @param isCached true for a page that need not be fetched */
+  constructor(list: PageList, slots: number, isCached: (page: number) => boolean = () => false) {
     this.#list = list;
-    this.#isAtHand = isAtHand;
+    this.#isCached = isCached;
     this.#slots = new PageSlots(list.count, slots);
-    this.#wish = new Float32Array(list.count);
-    this.#wishedAt = new Uint32Array(list.count);
+    this.#request = new Float32Array(list.count);
+    this.#requestedAt = new Uint32Array(list.count);
     this.#below = new Uint32Array(list.count);
     this.#isTooLarge = largerThan(slots, list);
     this.#isListed = new Uint8Array(list.count);
     this.#missing = new RankedHeap(list.count);
-    this.#leavers = new RankedHeap(slots);
+    this.#evictees = new RankedHeap(slots);
   }
 
   /** [S] page in each slot, or {@link NONE}. */
@@ -87,24 +87,24 @@ export class Residency {
 
   /** Pixels that doing without a page would cost, as of the last look; 0 if that does not wish for it. */
   need(page: number): number {
-    return this.#wish[page];
+    return this.#request[page];
   }
 
   /** True for a page that the last looks have not wished for. */
-  isForgotten(page: number): boolean {
-    return this.#look - this.#wishedAt[page] >= PATIENCE;
+  isStale(page: number): boolean {
+    return this.#sample - this.#requestedAt[page] >= STALE_AFTER;
   }
 
   /** Takes note of a look: for each page the pixels that doing without it would cost, 0 for those that nobody wishes for. */
-  note(wishes: Float32Array): void {
-    this.#look++;
+  note(requests: Float32Array): void {
+    this.#sample++;
     this.#noRoom = { slots: Infinity, need: 0 };
-    this.#wish.set(wishes.subarray(0, this.#list.count));
+    this.#request.set(requests.subarray(0, this.#list.count));
     for (let page = 0; page < this.#list.count; page++) {
-      if (wishes[page] > 0) this.#wishedAt[page] = this.#look;
+      if (requests[page] > 0) this.#requestedAt[page] = this.#sample;
     }
     this.#listMissing();
-    this.#listLeavers();
+    this.#rankEvictable();
   }
 
   /**
@@ -117,14 +117,14 @@ export class Residency {
     while (slots > 1 || this.#missing.largest > need) {
       const page = this.#missing.pop();
       if (page === NONE) return NONE;
-      const hasNoRoom = this.#list.slots[page] >= slots && this.#wish[page] <= need;
+      const hasNoRoom = this.#list.slots[page] >= slots && this.#request[page] <= need;
       if (!hasNoRoom && this.#isMissing(page)) return page;
     }
     return NONE;
   }
 
   /** Lets {@link nextMissing} name again all that the last look wishes for and that is missing, whatever has found no room. */
-  relist(): void {
+  rebuildMissing(): void {
     this.#noRoom = { slots: Infinity, need: 0 };
     this.#listMissing();
   }
@@ -135,7 +135,7 @@ export class Residency {
     if (parent !== NONE) this.#hold(parent);
     if (!this.#makeRoom(page)) {
       if (parent !== NONE) this.#release(parent);
-      this.#noteNoRoom(this.#list.slots[page], this.#wish[page]);
+      this.#noteNoRoom(this.#list.slots[page], this.#request[page]);
       return false;
     }
     this.#coming.add(page);
@@ -144,13 +144,13 @@ export class Residency {
   }
 
   /** A page that was on its way does not come. */
-  giveUp(page: number): void {
+  cancel(page: number): void {
     if (!this.#coming.delete(page)) return;
     this.#slotsComing -= this.#list.slots[page];
     const parent = this.#list.parent[page];
     if (parent !== NONE) this.#release(parent);
-    while (this.#setAside.length > 0) {
-      const last = this.#setAside.at(-1)!;
+    while (this.#reserved.length > 0) {
+      const last = this.#reserved.at(-1)!;
       if (this.#slotsAside - this.#list.slots[last] < this.#lackingSlots) return;
       this.#putBack();
     }
@@ -158,18 +158,18 @@ export class Residency {
 
   /** A page has come. @returns its slots and the pages that left for it; undefined if there is no room any more. */
   settle(page: number): Settled | undefined {
-    const leavers = this.#leaversFor(page);
-    if (leavers === undefined) {
-      this.giveUp(page);
+    const evictees = this.#evicteesFor(page);
+    if (evictees === undefined) {
+      this.cancel(page);
       return undefined;
     }
-    const left = leavers.map((leaver) => ({ page: leaver, slots: this.#slots.clear(leaver) }));
+    const left = evictees.map((evictee) => ({ page: evictee, slots: this.#slots.clear(evictee) }));
     this.#coming.delete(page);
     this.#slotsComing -= this.#list.slots[page];
     const slots = this.#slots.fill(page, this.#list.slots[page]);
-    for (const leaver of leavers) {
-      this.#isListed[leaver] = 0;
-      this.#release(this.#list.parent[leaver]);
+    for (const evictee of evictees) {
+      this.#isListed[evictee] = 0;
+      this.#release(this.#list.parent[evictee]);
     }
     this.#offer(page);
     return { slots, left };
@@ -189,52 +189,52 @@ export class Residency {
   #isMissing(page: number): boolean {
     const above = this.#list.parent[page];
     const isNew = !this.isResident(page) && !this.#coming.has(page) && this.#isTooLarge[page] === 0;
-    return this.#wish[page] > 0 && isNew && (above === NONE || this.isResident(above));
+    return this.#request[page] > 0 && isNew && (above === NONE || this.isResident(above));
   }
 
   #listMissing(): void {
     this.#missing.clear();
     for (let page = 0; page < this.#list.count; page++) {
-      if (this.#wish[page] === 0 || !this.#isMissing(page)) continue;
-      this.#missing.add(page, this.#wish[page] * (this.#isAtHand(page) ? AT_HAND : 1));
+      if (this.#request[page] === 0 || !this.#isMissing(page)) continue;
+      this.#missing.add(page, this.#request[page] * (this.#isCached(page) ? AT_HAND : 1));
     }
     this.#missing.order();
   }
 
-  #listLeavers(): void {
-    this.#leavers.clear();
+  #rankEvictable(): void {
+    this.#evictees.clear();
     this.#isListed.fill(0);
     for (const page of this.#slots.pages()) {
-      if (!this.#mayLeave(page)) continue;
+      if (!this.#isEvictable(page)) continue;
       this.#isListed[page] = 1;
-      this.#leavers.add(page, this.#spareRank(page));
+      this.#evictees.add(page, this.#evictionPriority(page));
     }
-    this.#leavers.order();
-    this.#setAside = [];
+    this.#evictees.order();
+    this.#reserved = [];
     this.#slotsAside = 0;
     while (this.#slotsAside < this.#lackingSlots) {
-      const page = this.#nextLeaver();
+      const page = this.#nextEvictable();
       if (page === NONE) return;
       this.#putAside(page);
     }
   }
 
   /** Never the coarsest page, nor one that has anything below it. */
-  #mayLeave(page: number): boolean {
+  #isEvictable(page: number): boolean {
     return this.isResident(page) && this.#below[page] === 0 && this.#list.parent[page] !== NONE;
   }
 
   /** How well a page can be spared: best one not wished for the longest; of those wished for the least needed. */
-  #spareRank(page: number): number {
-    const age = this.#look - this.#wishedAt[page];
-    return age > 0 ? age : -this.#wish[page];
+  #evictionPriority(page: number): number {
+    const age = this.#sample - this.#requestedAt[page];
+    return age > 0 ? age : -this.#request[page];
   }
 
   /** Puts a page among those that may leave, if it may. */
   #offer(page: number): void {
-    if (this.#isListed[page] === 1 || !this.#mayLeave(page)) return;
+    if (this.#isListed[page] === 1 || !this.#isEvictable(page)) return;
     this.#isListed[page] = 1;
-    this.#leavers.push(page, this.#spareRank(page));
+    this.#evictees.push(page, this.#evictionPriority(page));
   }
 
   #return(page: number): void {
@@ -243,70 +243,70 @@ export class Residency {
   }
 
   /** Takes the page that can best be spared; it counts as listed until it has left or is returned. */
-  #nextLeaver(): number {
-    for (let page = this.#leavers.pop(); page !== NONE; page = this.#leavers.pop()) {
-      if (this.#mayLeave(page)) return page;
+  #nextEvictable(): number {
+    for (let page = this.#evictees.pop(); page !== NONE; page = this.#evictees.pop()) {
+      if (this.#isEvictable(page)) return page;
       this.#isListed[page] = 0;
     }
     return NONE;
   }
 
   #putAside(page: number): void {
-    this.#setAside.push(page);
+    this.#reserved.push(page);
     this.#slotsAside += this.#list.slots[page];
   }
 
   /** Returns what was set aside last. */
   #putBack(): void {
-    const page = this.#setAside.pop()!;
+    const page = this.#reserved.pop()!;
     this.#slotsAside -= this.#list.slots[page];
     this.#return(page);
   }
 
-  #isWorth(page: number, leaver: number): boolean {
-    return this.#wishedAt[leaver] !== this.#look || WORTH * this.#wish[leaver] < this.#wish[page];
+  #isWorth(page: number, evictee: number): boolean {
+    return this.#requestedAt[evictee] !== this.#sample || WORTH * this.#request[evictee] < this.#request[page];
   }
 
   /** Sees to slots for one page more than are on their way. */
   #makeRoom(page: number): boolean {
     const lacking = this.#slotsComing + this.#list.slots[page] - this.#slots.empty;
-    const before = this.#setAside.length;
+    const before = this.#reserved.length;
     while (this.#slotsAside < lacking) {
-      const leaver = this.#nextLeaver();
-      if (leaver !== NONE && this.#isWorth(page, leaver)) {
-        this.#putAside(leaver);
+      const evictee = this.#nextEvictable();
+      if (evictee !== NONE && this.#isWorth(page, evictee)) {
+        this.#putAside(evictee);
         continue;
       }
-      if (leaver !== NONE) this.#return(leaver);
-      while (this.#setAside.length > before) this.#putBack();
+      if (evictee !== NONE) this.#return(evictee);
+      while (this.#reserved.length > before) this.#putBack();
       return false;
     }
     return true;
   }
 
   /** The pages that leave for one that has come; undefined if too few are needed so much less. */
-  #leaversFor(page: number): number[] | undefined {
-    const leavers: number[] = [];
+  #evicteesFor(page: number): number[] | undefined {
+    const evictees: number[] = [];
     for (let room = this.#slots.empty; room < this.#list.slots[page];) {
-      const aside = this.#setAside.shift();
+      const aside = this.#reserved.shift();
       if (aside !== undefined) this.#slotsAside -= this.#list.slots[aside];
-      const leaver = aside !== undefined && this.#mayLeave(aside) ? aside : this.#nextLeaver();
-      if (leaver !== NONE) leavers.push(leaver);
-      if (leaver === NONE || !this.#isWorth(page, leaver)) {
-        leavers.forEach((spared) => this.#return(spared));
+      const evictee = aside !== undefined && this.#isEvictable(aside) ? aside : this.#nextEvictable();
+      if (evictee !== NONE) evictees.push(evictee);
+      if (evictee === NONE || !this.#isWorth(page, evictee)) {
+        evictees.forEach((spared) => this.#return(spared));
         return undefined;
       }
-      room += this.#list.slots[leaver];
+      room += this.#list.slots[evictee];
     }
-    return leavers;
+    return evictees;
   }
 
   /** Something below a page is on its way: it must stay. */
   #hold(page: number): void {
     this.#below[page]++;
-    const at = this.#setAside.indexOf(page);
+    const at = this.#reserved.indexOf(page);
     if (at < 0) return;
-    this.#setAside.splice(at, 1);
+    this.#reserved.splice(at, 1);
     this.#slotsAside -= this.#list.slots[page];
     this.#isListed[page] = 0;
   }

@@ -15,7 +15,7 @@ import { Residency } from './residency.js';
 import type { SlotWords } from './slot-words.js';
 import { UploadPace } from './upload-pace.js';
 import { aheadMs } from './camera-motion.js';
-import { WishReader } from './wish-reader.js';
+import { PageFeedback } from './page-feedback.js';
 import type { ShPrecision } from '../pack/words.js';
 
 export interface PoolOptions {
@@ -93,7 +93,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly pages: readonly GaussianPage[];
   readonly detailBudget: DetailBudget;
   /** Page requests of the views: for the renderer. */
-  readonly pageRequests: WishReader;
+  readonly pageRequests: PageFeedback;
   readonly #source: PageSource;
   readonly #options: PoolOptions;
   readonly #memory: GpuMemory;
@@ -135,12 +135,12 @@ export class StreamedGaussians implements GaussianScene {
     this.#memory = new GpuMemory(device);
     try {
       this.#pool = new PagePool(device, this.#memory, scene, size);
-      this.pageRequests = new WishReader(device, this.#memory, {
+      this.pageRequests = new PageFeedback(device, this.#memory, {
         pages: list.count,
         origin,
         aheadMs: () => aheadMs(this.#traffic.arrivalMs),
         version: () => this.#version,
-        onWishes: (wishes, lacking) => this.#take(wishes, lacking),
+        onFeedback: (requests, lacking) => this.#take(requests, lacking),
         onStale: () => this.#options.onChange?.(),
       });
     } catch (error) {
@@ -148,7 +148,7 @@ export class StreamedGaussians implements GaussianScene {
       throw error;
     }
     this.pages = this.#pool.pages;
-    this.#residency = new Residency(list, slots, source.isAtHand);
+    this.#residency = new Residency(list, slots, source.isCached);
     this.#traffic = new PageTraffic(this.#residency, {
       fetch: async (page, signal) => {
         const words = await source.fetch(page, signal);
@@ -292,9 +292,9 @@ export class StreamedGaussians implements GaussianScene {
   #begin(page: number, parts: readonly SlotWords[]): boolean {
     const place = this.#residency.settle(page);
     if (place === undefined) return false;
-    for (const { page: leaver, slots } of place.left) {
-      this.#arrivals.forget(leaver);
-      this.#rows.leave(leaver, slots);
+    for (const { page: evictee, slots } of place.left) {
+      this.#arrivals.forget(evictee);
+      this.#rows.leave(evictee, slots);
       this.#version++;
     }
     this.#upload = { page, slots: place.slots, parts, by: this.#source.translate?.(page) ?? IN_PLACE, written: 0 };
@@ -327,10 +327,10 @@ export class StreamedGaussians implements GaussianScene {
     this.#pool.flush();
   }
 
-  #take(wishes: Float32Array, lacking: number): void {
+  #take(requests: Float32Array, lacking: number): void {
     if (this.#isDestroyed) return;
     this.#lacking = lacking;
-    this.#residency.note(wishes);
+    this.#residency.note(requests);
     this.#traffic.follow();
   }
 }

@@ -1,12 +1,12 @@
 import type { Camera, Vector3 } from '@gaussian-splat/core';
-import type { NotedPage, PageRequests, WishLevers } from '../gaussian-scene.js';
+import type { FeedbackInputs, PageRequests, FeedbackSettings } from '../gaussian-scene.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { cameraValues } from '../view.js';
 import { CameraMotion } from './camera-motion.js';
-import { MOST_VIEWS, SeenViews } from './seen-views.js';
+import { MOST_VIEWS, FeedbackViews } from './feedback-views.js';
 import { constants } from '../generated/shaders.js';
-import { noteWishes } from '../generated/streamed-shaders.js';
+import { pageFeedback } from '../generated/streamed-shaders.js';
 import { Stage } from '../stages/stage.js';
 
 /** Frames between two looks at what is wished for: of a camera that rests, and of one that moves. Both odd, for two views that are drawn in turn. */
@@ -15,10 +15,10 @@ const MOVING_INTERVAL = 3;
 /** Milliseconds after which views that nobody has looked at are drawn once more, to look; for so long those that have been looked at give way to them. */
 const STALE_MS = 120;
 
-/** Numbers of `ahead` in shaders/note_wishes.wgsl: four columns and the eye. */
+/** Numbers of `ahead` in shaders/page_feedback.wgsl: four columns and the eye. */
 const AHEAD_NUMBERS = 20;
 
-export interface WishReaderOptions {
+export interface PageFeedbackOptions {
   readonly pages: number;
   /** Of the scene: world position that all positions are relative to. */
   readonly origin: Vector3;
@@ -27,22 +27,22 @@ export interface WishReaderOptions {
   /** Grows with all that the scene has more or less of. */
   readonly version: () => number;
   /** Called with the pixels that doing without each page costs the view, or the one that it will have become; and with the most that the view lacks. */
-  readonly onWishes: (wishes: Float32Array, lacking: number) => void;
+  readonly onFeedback: (requests: Float32Array, lacking: number) => void;
   /** Called when the last view has not been looked at for want of another frame. */
   readonly onStale: () => void;
 }
 
 /** Brings what views wish for back from the GPU, now and then, with nobody waiting for it. */
-export class WishReader implements PageRequests {
-  readonly #stage: Stage<typeof noteWishes>;
+export class PageFeedback implements PageRequests {
+  readonly #stage: Stage<typeof pageFeedback>;
   /** For each page the bits of the pixels that doing without it costs, a float32; at 0, the page that is always there, what the view lacks. Cleared before each look. */
-  readonly #wishes: GPUBuffer;
+  readonly #requests: GPUBuffer;
   readonly #staging: GPUBuffer;
   readonly #ahead: GPUBuffer;
   readonly #device: GPUDevice;
-  readonly #options: WishReaderOptions;
+  readonly #options: PageFeedbackOptions;
   readonly #motion = new CameraMotion();
-  readonly #views = new SeenViews();
+  readonly #views = new FeedbackViews();
   /** Views drawn of late that nobody has looked at. */
   readonly #unseen = new Set<string>();
   #givesWayUntil = -Infinity;
@@ -50,19 +50,19 @@ export class WishReader implements PageRequests {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
 
-  constructor(device: GPUDevice, memory: GpuMemory, options: WishReaderOptions) {
+  constructor(device: GPUDevice, memory: GpuMemory, options: PageFeedbackOptions) {
     this.#device = device;
     this.#options = options;
-    this.#stage = new Stage(device, noteWishes, constants.CULL_GROUP * constants.WISH_THREADS);
+    this.#stage = new Stage(device, pageFeedback, constants.CULL_GROUP * constants.FEEDBACK_THREADS);
     const { storage, uniform, copySource, copyDestination, mapRead } = BUFFER_USAGE;
     const bytes = 4 * options.pages;
-    this.#wishes = memory.buffer('gs.wishes', bytes, storage | copySource | copyDestination);
-    this.#staging = memory.buffer('gs.wishes.staging', bytes, mapRead | copyDestination);
-    this.#ahead = memory.buffer('gs.wishes.ahead', 4 * AHEAD_NUMBERS, uniform | copyDestination);
+    this.#requests = memory.buffer('gs.requests', bytes, storage | copySource | copyDestination);
+    this.#staging = memory.buffer('gs.requests.staging', bytes, mapRead | copyDestination);
+    this.#ahead = memory.buffer('gs.requests.ahead', 4 * AHEAD_NUMBERS, uniform | copyDestination);
   }
 
   /** True for a frame that must note wishes; then {@link begin}, {@link note}, {@link copy} and, after the submit, {@link read} follow. */
-  isDue(camera: Camera, levers: WishLevers): boolean {
+  isDue(camera: Camera, levers: FeedbackSettings): boolean {
     const now = performance.now();
     this.#motion.observe(camera, now);
     const { isMoving } = this.#motion;
@@ -87,10 +87,10 @@ export class WishReader implements PageRequests {
     const [oldest] = this.#unseen;
     if (this.#unseen.size > MOST_VIEWS) this.#unseen.delete(oldest);
     clearTimeout(this.#timer);
-    if (this.#unseen.size > 0) this.#timer = setTimeout(() => this.#look(), STALE_MS);
+    if (this.#unseen.size > 0) this.#timer = setTimeout(() => this.#sample(), STALE_MS);
   }
 
-  #look(): void {
+  #sample(): void {
     this.#frames = INTERVAL;
     this.#unseen.clear();
     this.#givesWayUntil = performance.now() + STALE_MS;
@@ -98,7 +98,7 @@ export class WishReader implements PageRequests {
   }
 
   begin(encoder: GPUCommandEncoder): void {
-    encoder.clearBuffer(this.#wishes);
+    encoder.clearBuffer(this.#requests);
     const { origin, aheadMs } = this.#options;
     const { local_to_camera, eye } = cameraValues(this.#motion.ahead(aheadMs()), origin);
     const numbers = new Float32Array(AHEAD_NUMBERS);
@@ -107,10 +107,10 @@ export class WishReader implements PageRequests {
     this.#device.queue.writeBuffer(this.#ahead, 0, numbers);
   }
 
-  bind(page: NotedPage): GPUBindGroup {
+  bind(page: FeedbackInputs): GPUBindGroup {
     // Another size, or other scenes in the same picture.
     this.#views.clear();
-    return this.#stage.bind({ ...page, ahead: this.#ahead, wishes: this.#wishes });
+    return this.#stage.bind({ ...page, ahead: this.#ahead, requests: this.#requests });
   }
 
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
@@ -118,17 +118,17 @@ export class WishReader implements PageRequests {
   }
 
   copy(encoder: GPUCommandEncoder): void {
-    encoder.copyBufferToBuffer(this.#wishes, 0, this.#staging, 0, this.#wishes.size);
+    encoder.copyBufferToBuffer(this.#requests, 0, this.#staging, 0, this.#requests.size);
     this.#isReading = true;
   }
 
   read(): void {
     this.#staging.mapAsync(0x1).then(
       () => {
-        const wishes = this.#views.end(new Float32Array(this.#staging.getMappedRange().slice(0)));
+        const requests = this.#views.end(new Float32Array(this.#staging.getMappedRange().slice(0)));
         this.#staging.unmap();
         this.#isReading = false;
-        this.#options.onWishes(wishes, wishes[0]);
+        this.#options.onFeedback(requests, requests[0]);
       },
       // The device is lost, or the scene was destroyed meanwhile.
       () => undefined,
@@ -137,7 +137,7 @@ export class WishReader implements PageRequests {
 }
 
 /** All that a look depends on, but for the content of the scene. */
-function nameOf(camera: Camera, { detail, detailFade, splatBudget }: WishLevers): string {
+function nameOf(camera: Camera, { detail, detailFade, splatBudget }: FeedbackSettings): string {
   const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
   return [...worldToCamera, width, height, fx, fy, cx, cy, near, far, detail, detailFade, splatBudget].join(' ');
 }

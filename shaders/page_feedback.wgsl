@@ -10,11 +10,11 @@
 @group(0) @binding(3) var<storage, read> chunk_shares: array<f32>;
 // For each streamed page the error in pixels of a missing page, as float32 bits, or 0. The first page is always
 // resident: its entry holds the largest error of the view.
-@group(0) @binding(4) var<storage, read_write> wishes: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> requests: array<atomic<u32>>;
 // The predicted camera: the columns of `local_to_camera`, and the eye.
 @group(0) @binding(5) var<uniform> ahead: array<vec4f, 5>;
 
-const WISH_THREADS = 64u;
+const FEEDBACK_THREADS = 64u;
 // Factors of the error of pages outside the view: NEARBY within an image NEARBY_SIZE times as wide and high, UNSEEN
 // beyond. A camera that turns or moves unexpectedly then finds them resident.
 const NEARBY = 0.25;
@@ -30,7 +30,7 @@ const SOON = 0.93;
 const KEPT = 0.7;
 
 // Screen error of a missing page in pixels, or 0 if it is at most `least`.
-fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -> f32 {
+fn page_error(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -> f32 {
   let pixels = screen_error(seen, d.sphere, d.full_error);
   if (pixels <= least && refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
   if (may_be_visible(seen, chunk)) { return pixels; }
@@ -45,13 +45,13 @@ fn nearby(seen: View) -> View {
   return wider;
 }
 
-@compute @workgroup_size(WISH_THREADS)
+@compute @workgroup_size(FEEDBACK_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let chunk = group_index(workgroup_id) * WISH_THREADS + lane;
+  let chunk = group_index(workgroup_id) * FEEDBACK_THREADS + lane;
   if (chunk * CULL_GROUP >= view.splat_count) { return; }
   let d = details[chunk];
   let page = d.children & CHILD_PAGE_MASK;
-  if (page >= arrayLength(&wishes)) { return; }
+  if (page >= arrayLength(&requests)) { return; }
   var later = view;
   later.local_to_camera = mat4x4f(ahead[0], ahead[1], ahead[2], ahead[3]);
   later.eye = ahead[4].xyz;
@@ -59,9 +59,9 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let is_kept = d.error > 0.0 && allowed > view.detail;
   let bound = select(allowed, max(view.detail, KEPT * allowed), is_kept);
   let soon = SOON * bound;
-  let wish = max(wish_of(view, chunks[chunk], d, bound, soon), wish_of(later, chunks[chunk], d, bound, soon));
-  if (wish > 0.0) { atomicMax(&wishes[page], bitcast<u32>(wish)); }
+  let request = max(page_error(view, chunks[chunk], d, bound, soon), page_error(later, chunks[chunk], d, bound, soon));
+  if (request > 0.0) { atomicMax(&requests[page], bitcast<u32>(request)); }
   if (d.error > 0.0) { return; }
-  let now = wish_of(view, chunks[chunk], d, allowed, allowed);
-  if (now > 0.0) { atomicMax(&wishes[0], bitcast<u32>(now)); }
+  let now = page_error(view, chunks[chunk], d, allowed, allowed);
+  if (now > 0.0) { atomicMax(&requests[0], bitcast<u32>(now)); }
 }

@@ -22,7 +22,7 @@ const MOST_OF_MOTION = 2;
 const NOTHING: Capacity = { visible: 0, pairs: 0 };
 
 /** Which picture a look was at. */
-export interface LookedAt {
+export interface SampledFrame {
   /** Its pixels. */
   readonly pixels: number;
   /** Those of the picture at rest. */
@@ -31,7 +31,7 @@ export interface LookedAt {
   readonly isWhole: boolean;
 }
 
-interface Look extends LookedAt {
+interface CountSample extends SampledFrame {
   readonly used: Capacity;
   readonly at: number;
 }
@@ -43,11 +43,11 @@ interface Ratio {
 }
 
 /** What the monitors of a scene learn: how long room to spare is kept, and what the picture at rest needs while those in motion show less. */
-export class CapacityMemory {
+export class CapacityHistory {
   #looks = PATIENCE;
   #hasShrunk = false;
   #whole = { pixels: 0, need: NOTHING };
-  #last: Look | undefined;
+  #last: CountSample | undefined;
   #ratio: Ratio = { pixels: 1, need: { visible: 1, pairs: 1 } };
 
   /** Looks at the buffers before they shrink. */
@@ -67,13 +67,13 @@ export class CapacityMemory {
   }
 
   /** Takes note of a look. */
-  note(look: Look): void {
+  note(sample: CountSample): void {
     const last = this.#last;
-    this.#last = look;
-    if (look.isWhole) this.#whole = { pixels: look.pixels, need: look.used };
-    const isNew = last?.isWhole !== look.isWhole && last?.wholePixels === look.wholePixels;
-    if (!isNew || look.at - last.at > SAME_VIEW_MS) return;
-    const [less, whole] = look.isWhole ? [last, look] : [look, last];
+    this.#last = sample;
+    if (sample.isWhole) this.#whole = { pixels: sample.pixels, need: sample.used };
+    const isNew = last?.isWhole !== sample.isWhole && last?.wholePixels === sample.wholePixels;
+    if (!isNew || sample.at - last.at > SAME_VIEW_MS) return;
+    const [less, whole] = sample.isWhole ? [last, sample] : [sample, last];
     const ratioOf = (key: keyof Capacity): number => whole.used[key] / Math.max(1, less.used[key]);
     this.#ratio = {
       pixels: whole.pixels / less.pixels,
@@ -92,7 +92,7 @@ export class CapacityMemory {
   }
 
   /** What the whole picture of the same view would need: so many times as much as when pictures last changed from one kind to the other. */
-  wholeNeedBy({ pixels, wholePixels, isWhole, used }: Omit<Look, 'at'>): Capacity {
+  wholeNeedBy({ pixels, wholePixels, isWhole, used }: Omit<CountSample, 'at'>): Capacity {
     if (isWhole) return used;
     const { pixels: seen, need } = this.#ratio;
     const times = wholePixels / pixels;
