@@ -53,7 +53,7 @@ async function load(path: string, streamBytes: number, previews: number[] = []):
   const request = { url: `${base}/${path}`, credentials: 'omit', sh: 'auto', streamBytes } as const;
   const onPreview = ({ packed }: LoadedScene): number => previews.push(packed.count);
   const scene = await loadScene(request, new AbortController().signal, { onProgress: () => undefined, onPreview });
-  assert.ok('packed' in scene);
+  assert.ok('packed' in scene && scene.packed);
   return scene;
 }
 

@@ -4,7 +4,6 @@ import { test } from 'node:test';
 import { boundsOf, keepUsable, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import {
-  boundsOfPacked,
   JoinedBlocks,
   layoutOf,
   packShare,
@@ -81,17 +80,18 @@ const partsOf = (whole: GaussianCloud): GaussianCloud[] => {
 };
 
 /** Packs parts by a layout, and by another if the scene asks for it. */
-function joined(parts: readonly GaussianCloud[], layout: ShareLayout, rows: number): PackedGaussians {
+function joined(parts: readonly GaussianCloud[], layout: ShareLayout, rows: number): JoinedBlocks {
   const cells = new ShareCells(layout);
   const shares = parts.map((cloud) => packShare(cloud, layout));
   for (const share of shares) cells.add(share);
   const needed = cells.layoutFor();
   if (needed !== layout) return joined(parts, needed, rows);
   const count = shares.reduce((sum, share) => sum + share.count, 0);
-  const blocks = new JoinedBlocks(layout, count);
-  for (const cell of cells.all().reverse()) blocks.add(sortBlock(cell.block()));
   const { antialiased, origin } = parts[0];
-  return blocks.finish({ antialiased, filterVariance: undefined, origin, droppedCount: rows - count });
+  const facts = { antialiased, filterVariance: undefined, origin, droppedCount: rows - count };
+  const blocks = new JoinedBlocks(layout, count, facts);
+  for (const cell of cells.all().reverse()) blocks.add(sortBlock(cell.block()));
+  return blocks;
 }
 
 for (const [name, kind] of Object.entries(KINDS)) {
@@ -99,10 +99,9 @@ for (const [name, kind] of Object.entries(KINDS)) {
     const whole = scene(kind);
     const kept = keepUsable(part(whole, 0, whole.count));
     const expected = packGaussians(kept);
-    const packed = joined(partsOf(whole), layoutOf(kept, 'int8'), whole.count);
+    const { packed, bounds: found } = joined(partsOf(whole), layoutOf(kept, 'int8'), whole.count);
     assert.equal(expected.shPrecision, kind.shine === 3 ? 'float16' : 'int8');
     assert.deepEqual(packed, expected);
-    const found = boundsOfPacked(packed);
     const bounds = boundsOf(kept);
     assert.deepEqual([found.min, found.max], kind.away ? [found.min, found.max] : [bounds.min, bounds.max]);
     assert.ok(Math.abs(found.radius - bounds.radius) < 0.01 * bounds.radius, `${found.radius}, ${bounds.radius}`);
@@ -140,7 +139,7 @@ test('a layout by the first share of a file in spatial order keeps neighbors tog
   };
   const parts = partsOf(whole);
   const expected = packGaussians(keepUsable(part(whole, 0, whole.count)));
-  const packed = joined(parts, layoutOf(parts[0], 'int8'), whole.count);
+  const { packed } = joined(parts, layoutOf(parts[0], 'int8'), whole.count);
   assert.deepEqual(sorted(packed), sorted(expected), 'the same splats');
   const [found, best] = [packed, expected].map(reachOfChunks);
   console.log(`mean diagonal of a chunk ${found.toFixed(3)}, by the whole scene ${best.toFixed(3)}`);
@@ -152,6 +151,6 @@ test('a scene whose end lies in planes keeps the order of its file', () => {
   for (let i = SHARE_SPLATS; i < whole.count; i++) whole.positions[3 * i + 1] = i % 8;
   const parts = partsOf(whole);
   const kept = keepUsable(part(whole, 0, whole.count));
-  const packed = joined(parts, layoutOf(parts[0], 'int8'), whole.count);
+  const { packed } = joined(parts, layoutOf(parts[0], 'int8'), whole.count);
   assert.deepEqual(packed, packGaussians(kept));
 });

@@ -63,6 +63,17 @@ function makeBench(device: GPUDevice, memory: GpuMemory): Bench {
   };
 }
 
+/** The same device, which says that it binds no more than so many bytes of a buffer. */
+export function withBufferLimit(device: GPUDevice, limit: number): GPUDevice {
+  return new Proxy(device, {
+    get(target, name) {
+      if (name === 'limits') return { maxBufferSize: limit, maxStorageBufferBindingSize: limit };
+      const value = Reflect.get(target, name, target) as unknown;
+      return typeof value === 'function' ? value.bind(target) : value;
+    },
+  });
+}
+
 /** Fails the running test with a message unless the condition holds. */
 export function check(condition: boolean, message: string): asserts condition {
   if (!condition) throw new Error(message);

@@ -6,14 +6,20 @@ import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { turn } from './gpu/page-thread.js';
 import { MemoryLedger, type Reservation } from './memory-ledger.js';
 import { DETAIL_NUMBERS } from './levels/chunk-detail.js';
-import { type PackedGaussians } from './pack/pack.js';
+import type { PackedGaussians, PackedHead } from './pack/pack.js';
 import type { DetailBudget } from './stages/detail-budget.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 export interface UploadOptions {
   /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
-  readonly memoryBudget?: number;
+  readonly memoryBudget?: number | undefined;
 }
+
+/** Bytes of packed Gaussians, from splat `start` on. */
+export type PackedPortion = Partial<Pick<PackedGaussians, 'geometry' | 'sh' | 'chunks' | 'details'>> & {
+  /** Splats before them; of `chunks` and `details` a multiple of 256. */
+  readonly start?: number;
+};
 
 /** Gaussians on the GPU, ready for any {@link Viewpoint} of the same device. */
 export class GaussianBuffers implements GaussianScene {
@@ -35,12 +41,13 @@ export class GaussianBuffers implements GaussianScene {
   readonly version = 0;
   /** If there are levels of detail. */
   readonly detailBudget: DetailBudget | undefined;
+  readonly #queue: GPUQueue;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
-  readonly #contents: readonly Content[];
 
-  private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number, budget?: DetailBudget) {
+  private constructor(device: GPUDevice, packed: PackedHead, memoryBudget?: number, budget?: DetailBudget) {
     this.detailBudget = budget;
+    this.#queue = device.queue;
     ({
       count: this.count,
       shDegree: this.shDegree,
@@ -51,12 +58,11 @@ export class GaussianBuffers implements GaussianScene {
       droppedCount: this.droppedCount,
       leafCount: this.leafCount,
     } = packed);
-    const { geometry, sh, chunks, details } = packed;
-    const bytes = [geometry, sh, chunks, details].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
-    this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), bytes, memoryBudget);
+    const hasDetails = budget !== undefined;
+    this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), sceneBytes(packed, hasDetails), memoryBudget);
     this.#memory = new GpuMemory(device);
     try {
-      ({ pages: this.pages, contents: this.#contents } = makePages(device, packed, this.#memory));
+      this.pages = makePages(device, packed, hasDetails, this.#memory);
     } catch (error) {
       this.destroy();
       throw error;
@@ -72,13 +78,54 @@ export class GaussianBuffers implements GaussianScene {
   static async upload(
     device: GPUDevice,
     packed: PackedGaussians,
-    { memoryBudget }: UploadOptions = {},
+    options: UploadOptions = {},
   ): Promise<GaussianBuffers> {
-    const budget = packed.details && (await budgetOn(device));
-    const make = (): GaussianBuffers => new GaussianBuffers(device, packed, memoryBudget, budget);
-    const made = await withMemoryCheck(device, whatOf(packed), make);
-    await writeInTurns(device, made.#contents);
+    const made = await GaussianBuffers.allocate(device, packed, options, packed.details && (await budgetOn(device)));
+    await writeInTurns(device, made.#contentsOf(packed));
     return made;
+  }
+
+  /** Allocates the buffers of a scene whose bytes come in portions: see {@link write}. Rejects as {@link upload} does. */
+  static allocate(
+    device: GPUDevice,
+    packed: PackedHead,
+    { memoryBudget }: UploadOptions = {},
+    budget?: DetailBudget,
+  ): Promise<GaussianBuffers> {
+    return withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget, budget));
+  }
+
+  /** Copies a portion of the scene to the GPU at once: portions of more than a few megabytes keep the thread. */
+  write(portion: PackedPortion): void {
+    for (const { buffer, offset, words } of this.#contentsOf(portion)) this.#queue.writeBuffer(buffer, offset, words);
+  }
+
+  #contentsOf({ start = 0, geometry, sh, chunks, details }: PackedPortion): Content[] {
+    const { pages } = this;
+    const shStride = shWords(this.shDegree, this.shPrecision);
+    const place = (
+      name: 'geometry' | 'sh' | 'chunks' | 'details',
+      values: Uint32Array | Float32Array | undefined,
+      stride: number,
+      ofChunks: 1 | typeof constants.CULL_GROUP = 1,
+    ): Content[] => {
+      const contents: Content[] = [];
+      const capacity = Math.ceil(pages[0].count / ofChunks);
+      for (let at = 0, first = start / ofChunks; at < (values?.length ?? 0);) {
+        const page = Math.floor(first / capacity);
+        const words = wordsOf(values!, at, stride * ((page + 1) * capacity - first));
+        contents.push({ buffer: pages[page][name]!, offset: 4 * stride * (first - page * capacity), words });
+        at += words.length;
+        first += words.length / stride;
+      }
+      return contents;
+    };
+    return [
+      ...place('geometry', geometry, GEOMETRY_WORDS),
+      ...place('sh', sh, shStride),
+      ...place('chunks', chunks, CHUNK_NUMBERS, constants.CULL_GROUP),
+      ...place('details', details, DETAIL_NUMBERS, constants.CULL_GROUP),
+    ];
   }
 
   /** Bytes of GPU memory held. */
@@ -99,44 +146,50 @@ const budgetOn = (device: GPUDevice): Promise<DetailBudget> =>
     return detailBudgetOn(device);
   });
 
-const whatOf = ({ count }: PackedGaussians): string => `scene of ${count} splats`;
+const whatOf = ({ count }: PackedHead): string => `scene of ${count} splats`;
 
-/** What a buffer is to hold. */
+/** What a part of a buffer is to hold. */
 interface Content {
   readonly buffer: GPUBuffer;
+  /** Bytes of the buffer before it. */
+  readonly offset: number;
   readonly words: Uint32Array<ArrayBuffer>;
 }
 
-function makePages(
-  device: GPUDevice,
-  packed: PackedGaussians,
-  memory: GpuMemory,
-): { pages: GaussianPage[]; contents: Content[] } {
+/** At most `count` numbers from the `from`-th on, as words. */
+function wordsOf(
+  { buffer, byteOffset, length }: Uint32Array | Float32Array,
+  from: number,
+  count: number,
+): Uint32Array<ArrayBuffer> {
+  return new Uint32Array(buffer as ArrayBuffer, byteOffset + 4 * from, Math.min(count, length - from));
+}
+
+/** Bytes that a scene takes on the GPU. */
+export function sceneBytes({ count, shDegree, shPrecision }: PackedHead, hasDetails = false): number {
+  const perChunk = CHUNK_NUMBERS + (hasDetails ? DETAIL_NUMBERS : 0);
+  const words = GEOMETRY_WORDS + shWords(shDegree, shPrecision);
+  return 4 * (words * count + perChunk * Math.ceil(count / constants.CULL_GROUP));
+}
+
+function makePages(device: GPUDevice, packed: PackedHead, hasDetails: boolean, memory: GpuMemory): GaussianPage[] {
   const shStride = shWords(packed.shDegree, packed.shPrecision);
-  const chunks = new Uint32Array(packed.chunks.buffer, packed.chunks.byteOffset, packed.chunks.length);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
-  const details =
-    packed.details && new Uint32Array(packed.details.buffer, packed.details.byteOffset, packed.details.length);
   const pages: GaussianPage[] = [];
-  const contents: Content[] = [];
-  for (let first = 0; first < packed.count; first += capacity) {
-    const end = Math.min(first + capacity, packed.count);
-    const part = (label: string, words: Uint32Array, stride: number, from = first, to = end): GPUBuffer => {
-      const buffer = memory.buffer(label, 4 * stride * (to - from), usage);
-      contents.push({ buffer, words: words.subarray(stride * from, stride * to) as Uint32Array<ArrayBuffer> });
-      return buffer;
-    };
-    const [firstChunk, endChunk] = [first / constants.CULL_GROUP, Math.ceil(end / constants.CULL_GROUP)];
+  for (let left = packed.count; left > 0; left -= capacity) {
+    const count = Math.min(capacity, left);
+    const chunks = Math.ceil(count / constants.CULL_GROUP);
+    const part = (label: string, words: number): GPUBuffer => memory.buffer(`gs.gaussians.${label}`, 4 * words, usage);
     pages.push({
-      count: end - first,
-      geometry: part('gs.gaussians.geometry', packed.geometry, GEOMETRY_WORDS),
-      sh: part('gs.gaussians.sh', packed.sh, shStride),
-      chunks: part('gs.gaussians.chunks', chunks, CHUNK_NUMBERS, firstChunk, endChunk),
-      details: details && part('gs.gaussians.details', details, DETAIL_NUMBERS, firstChunk, endChunk),
+      count,
+      geometry: part('geometry', GEOMETRY_WORDS * count),
+      sh: part('sh', shStride * count),
+      chunks: part('chunks', CHUNK_NUMBERS * chunks),
+      details: hasDetails ? part('details', DETAIL_NUMBERS * chunks) : undefined,
     });
   }
-  return { pages, contents };
+  return pages;
 }
 
 /** Words that are handed to the GPU at once: 4 MB, some milliseconds. */
@@ -144,14 +197,14 @@ const WORDS_AT_ONCE = 1 << 20;
 
 async function writeInTurns({ queue }: GPUDevice, contents: readonly Content[]): Promise<void> {
   let left = WORDS_AT_ONCE;
-  for (const { buffer, words } of contents)
+  for (const { buffer, offset, words } of contents)
     for (let first = 0; first < words.length;) {
       if (left === 0) {
         await turn();
         left = WORDS_AT_ONCE;
       }
       const count = Math.min(left, words.length - first);
-      queue.writeBuffer(buffer, 4 * first, words, first, count);
+      queue.writeBuffer(buffer, offset + 4 * first, words, first, count);
       [first, left] = [first + count, left - count];
     }
 }

@@ -47,11 +47,12 @@ export { packLevelRuns } from './streaming/pack-runs.js';
 export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
 export { readPacked } from './pack/packed-scene.js';
+export type { PackedHead } from './pack/pack.js';
+export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';
 export { boundsOfWorld } from './world-bounds.js';
 export { type Threads } from './stages/stage.js';
 export { bytesPerSplat, type Reservation } from './memory-ledger.js';
 export {
-  boundsOfPacked,
   JoinedBlocks,
   layoutOf,
   packShare,

@@ -2,6 +2,7 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { PackedGaussians } from '@gaussian-splat/renderer';
 import type * as sceneWorker from '../../../packages/element/src/loading/scene-worker.js';
+import type { PartListener } from '../../../packages/element/src/loading/protocol.js';
 import { assert, assertEqual, nextEvent, show, showLoaded } from './support/harness.js';
 
 const SPLATS = 200_000;
@@ -43,7 +44,7 @@ describe('a large PLY', () => {
     // By one thread, which has nobody to ask.
     const { loadScene } = (await import(SCRIPT)) as typeof sceneWorker;
     const whole = await loadScene(request(FILE), signal, { onProgress: ignore });
-    assert('packed' in whole, 'a scene');
+    assert('packed' in whole && whole.packed, 'a scene');
     expected = whole.packed;
     assertEqual(expected.droppedCount, Math.ceil(SPLATS / 16_911) * 17 - 3, 'splats that are of no use');
   });
@@ -87,6 +88,32 @@ describe('a large PLY', () => {
     });
     assert(isKilled && spawned.length > 1, 'helpers were there');
     assertSame(scene.packed, expected);
+  });
+
+  it('comes in parts that are the whole, also if helpers die while its blocks are sorted', async () => {
+    const spawned: Worker[] = [];
+    const loader = new Loader(() => {
+      const worker = new Worker(SCRIPT, { type: 'module' });
+      spawned.push(worker);
+      return worker;
+    });
+    let joined: PackedGaussians | undefined;
+    const onPart: PartListener = (part) => {
+      if ('head' in part) {
+        const { count } = part.head;
+        const [geometry, sh] = [expected.geometry, expected.sh].map((words) => new Uint32Array(words.length));
+        joined = { ...part.head, geometry, sh, chunks: new Float32Array(8 * Math.ceil(count / 256)) };
+        spawned[1]?.terminate();
+      } else {
+        const { start = 0, geometry = [], sh = [], chunks = [] } = part.portion;
+        joined!.geometry.set(geometry, (expected.geometry.length / expected.count) * start);
+        joined!.sh.set(sh, (expected.sh.length / expected.count) * start);
+        joined!.chunks.set(chunks);
+      }
+    };
+    const scene = await loader.open(request(FILE), signal, ignore, undefined, onPart);
+    assert(!('packed' in scene) && joined, 'a scene whose splats came before it');
+    assertSame(joined, expected);
   });
 
   it('is packed also where no helper comes', async () => {

@@ -2,6 +2,7 @@ import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
 import { detailCases } from './detail.js';
 import { ingestCases } from './ingest.js';
+import { portionCases } from './portions.js';
 import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
 import { roundedApartCases } from './rounded-apart.js';
@@ -17,4 +18,5 @@ export const stageCases: readonly StageCase[] = [
   ...probeCases,
   ...sortCases,
   ...ingestCases,
+  ...portionCases,
 ];

@@ -2,7 +2,7 @@ import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { constants, scaleRotationFactor, shWords } from '@gaussian-splat/renderer/stages';
 import { halfToNumber, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import type { GaussianLayout } from '@gaussian-splat/core/contract';
-import { check, checkEqual, type Bench, type StageCase } from '../../support/gpu.js';
+import { check, checkEqual, withBufferLimit, type Bench, type StageCase } from '../../support/gpu.js';
 import { covarianceOf, writeTensors, type TensorSpec, type WrittenTensors } from '../../support/generator-tensors.js';
 import { edgeOnDiscs, hugeSplats, needles, room, thinned, type Scene } from '../../support/scenes.js';
 
@@ -233,13 +233,7 @@ const paged: StageCase = {
     // A device that binds no more than 512 rows of the widest tensor at once.
     const rowBytes = 4 * Math.max(...layout.attributes.map(({ rowStride }) => rowStride));
     const limit = 512 * Math.max(rowBytes, 32, 4 * shWords(layout.shDegree ?? 0, 'float16'));
-    const small = new Proxy(bench.device, {
-      get(target, name) {
-        if (name === 'limits') return { maxBufferSize: limit, maxStorageBufferBindingSize: limit };
-        const value = Reflect.get(target, name, target) as unknown;
-        return typeof value === 'function' ? value.bind(target) : value;
-      },
-    });
+    const small = withBufferLimit(bench.device, limit);
     const gaussians = await DynamicGaussians.create(small, layout);
     const buffers = Object.entries(tensors).map(([name, words]) => [name, bench.buffer(words)] as const);
     gaussians.ingest(Object.fromEntries(buffers), layout.capacity);

@@ -1,15 +1,16 @@
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { startVariants } from '@gaussian-splat/renderer';
 import type { LiveRequest } from '../live/live-model.js';
-import type { FileRequest, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { FileRequest, LoadedSequence, PartListener, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import { LoadedGaussians } from './loaded-gaussians.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
+import type { PartUploads } from './part-uploads.js';
 import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu, why } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
-import { byteLengthOf, upload } from './upload.js';
+import { byteLengthOf, shown, upload } from './upload.js';
 import { canvasFormat } from './viewport.js';
 
 export interface OpenOptions {
@@ -76,17 +77,33 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
   const choosing = acquiring.then(({ device }) => startVariants(device, pictures()));
   const previews =
     options.onPreview && new PreviewUploads({ ...options, onPreview: options.onPreview, ready: choosing });
-  const loading = options.loader.open(request, abort.signal, options.onProgress, previews?.show);
-  try {
-    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(unlessWrong)]);
+  const device = acquiring.then(async ({ device }) => {
+    await choosing.catch(unlessWrong);
     options.signal.throwIfAborted();
-    limitScenes(lease.device, options.memoryBudget);
-    if ('frames' in scene) return await openSequence(request, lease, scene, options);
+    limitScenes(device, options.memoryBudget);
+    return device;
+  });
+  const beforeUpload = (byteLength: number): void => {
     previews?.end();
-    options.beforeUpload(byteLengthOf(scene));
+    options.beforeUpload(byteLength);
+  };
+  let parts: Promise<PartUploads> | undefined;
+  const onPart: PartListener = (part) => {
+    parts ??= loadModule('the code that uploads large scenes', () => import('./part-uploads.js')).then(
+      ({ PartUploads }) => new PartUploads(device, { ...options, beforeUpload }),
+    );
+    parts.then((uploads) => uploads.add(part), ignore);
+  };
+  const loading = options.loader.open(request, abort.signal, options.onProgress, previews?.show, onPart);
+  try {
+    const [lease, scene] = await Promise.all([acquiring, loading, device]);
+    if ('frames' in scene) return await openSequence(request, lease, scene, options);
+    if (scene.packed === undefined) return shown(lease, await (await parts!).finish(), scene, options);
+    beforeUpload(byteLengthOf(scene));
     return await upload(lease, scene, options);
   } catch (error) {
     previews?.end();
+    parts?.then((uploads) => uploads.destroy(), ignore);
     abort.abort(error);
     acquiring.then((lease) => lease.release(), ignore);
     loading.catch(ignore);

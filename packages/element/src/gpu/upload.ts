@@ -1,5 +1,5 @@
 import { GaussianBuffers } from '@gaussian-splat/renderer';
-import type { LoadedScene } from '../loading/protocol.js';
+import type { LoadedFacts, LoadedScene } from '../loading/protocol.js';
 import { LoadedGaussians } from './loaded-gaussians.js';
 import type { DeviceLease } from './shared-device.js';
 
@@ -14,15 +14,22 @@ export interface SceneUploadOptions {
 /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
 export async function upload(
   lease: DeviceLease,
-  { packed, bounds, warnings, order, hasMeshes }: LoadedScene,
-  { signal, memoryBudget, submissions }: SceneUploadOptions,
+  scene: LoadedScene,
+  options: SceneUploadOptions,
 ): Promise<LoadedGaussians> {
-  const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
-  if (!signal.aborted)
-    return new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes });
+  const gaussians = await GaussianBuffers.upload(lease.device, scene.packed, options);
+  if (!options.signal.aborted) return shown(lease, gaussians, scene, options);
   gaussians.destroy();
-  throw signal.reason;
+  throw options.signal.reason;
 }
+
+/** A scene that is on the GPU. It owns the lease. */
+export const shown = (
+  lease: DeviceLease,
+  gaussians: GaussianBuffers,
+  { bounds, warnings, order, hasMeshes }: LoadedFacts,
+  { submissions }: Pick<SceneUploadOptions, 'submissions'>,
+): LoadedGaussians => new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes });
 
 /** Bytes that a scene takes on the GPU, all but exactly. */
 export function byteLengthOf({ packed }: LoadedScene): number {

@@ -3,18 +3,19 @@ import { MOST_DROPPED, splatRanges, type LoadLimits } from '@gaussian-splat/form
 import { boundsOf } from '@gaussian-splat/core';
 import { packGaussians } from '@gaussian-splat/renderer';
 import {
-  boundsOfPacked,
   JoinedBlocks,
   sortBlock,
+  type PackedPortion,
   type ShareCell,
   type ShareLayout,
+  type SortedBlock,
 } from '@gaussian-splat/renderer/tools';
 import type { LoadListeners } from './load-scene.js';
 import { packRows, release, type HelperAnswer, type HelperRequest } from './pack-shares.js';
 import { PartPreviews } from './part-previews.js';
 import { PlyHelpers, type HelperWork } from './ply-helpers.js';
 import { PlyShares, type Rows } from './ply-shares.js';
-import type { LoadedScene, SceneRequest } from './protocol.js';
+import type { LoadedScene, SceneRequest, SentScene } from './protocol.js';
 
 /** Without a helper until then, shares are packed here while bytes arrive, ms. */
 const ALONE_AFTER_MS = 500;
@@ -107,7 +108,7 @@ export class LargePly implements HelperWork {
   }
 
   /** The scene, once all bytes are there; undefined if something is wrong with them, which the reader of the whole file can say. */
-  async finish(bytes: Uint8Array): Promise<LoadedScene | undefined> {
+  async finish(bytes: Uint8Array): Promise<LoadedScene | SentScene | undefined> {
     const shares = this.#shares;
     shares.bytes = bytes;
     if (shares.arrived < shares.length) return undefined;
@@ -128,10 +129,17 @@ export class LargePly implements HelperWork {
       }
       // From here on nothing can fail. Without the file a scene takes a third of the memory.
       release(bytes);
-      const joined = await this.#join(layout, count);
       const { antialiased = false, filterVariance, origin = [0, 0, 0], up, order, warnings } = shares.facts;
-      const packed = joined.finish({ antialiased, filterVariance, origin, droppedCount });
-      return { packed, bounds: { ...boundsOfPacked(packed), up }, order, warnings };
+      const { onPart } = this.#listeners;
+      const send = onPart && ((portion: SortedBlock): void => onPart({ portion: ofSplats(portion) }));
+      const scene = { antialiased, filterVariance, origin, droppedCount };
+      const joined = new JoinedBlocks(layout, count, scene, send);
+      onPart?.({ head: joined.head });
+      await this.#join(joined);
+      const facts = { bounds: { ...joined.bounds, up }, order, warnings };
+      if (!onPart) return { ...facts, packed: joined.packed };
+      onPart({ portion: { chunks: joined.chunks } });
+      return facts;
     }
   }
 
@@ -158,8 +166,8 @@ export class LargePly implements HelperWork {
   }
 
   /** Has all blocks put in order. */
-  async #join(layout: ShareLayout, count: number): Promise<JoinedBlocks> {
-    const joined = (this.#joined = new JoinedBlocks(layout, count));
+  async #join(joined: JoinedBlocks): Promise<void> {
+    this.#joined = joined;
     // The largest first: nobody waits for it in the end.
     const cells = this.#shares.takeCells().sort((a, b) => b.count - a.count);
     cells.forEach((cell, k) => {
@@ -170,7 +178,6 @@ export class LargePly implements HelperWork {
     this.#again.reverse();
     this.#helpers.rooms.length = 0;
     await this.#workAll();
-    return joined;
   }
 
   get #isLate(): boolean {
@@ -212,6 +219,9 @@ export class LargePly implements HelperWork {
     }
   }
 }
+
+/** The bounds of its chunks are sent when those of all are known. */
+const ofSplats = ({ start, geometry, sh }: SortedBlock): PackedPortion => ({ start, geometry, sh });
 
 let own: MessageChannel | undefined;
 

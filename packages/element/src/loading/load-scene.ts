@@ -14,7 +14,15 @@ import { fileName, named, throttled } from './load-helpers.js';
 import type { LargePly } from './large-ply.js';
 import type * as sequences from './sequence-of.js';
 import { ProgressSum } from './progress-sum.js';
-import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
+import type {
+  LoadedScene,
+  LoadedSequence,
+  PartListener,
+  PreviewListener,
+  ProgressListener,
+  SceneRequest,
+  SentScene,
+} from './protocol.js';
 
 /** Downloads that are over sooner need no preview. */
 const PREVIEW_AFTER_MS = 300;
@@ -28,6 +36,8 @@ export interface LoadListeners {
   readonly onProgress: ProgressListener;
   /** Absent: previews are not wanted. */
   readonly onPreview?: PreviewListener | undefined;
+  /** Takes the splats of a large scene while they are put in order. Absent: they come with the scene. */
+  readonly onPart?: PartListener | undefined;
   /** Called before the thread is kept busy for a while, and while it is; with false when it has more time again. */
   readonly onReading?: (isReading: boolean) => void;
   /**
@@ -46,7 +56,7 @@ export async function loadScene(
   request: SceneRequest,
   signal: AbortSignal,
   listeners: LoadListeners,
-): Promise<LoadedScene | LoadedSequence> {
+): Promise<LoadedScene | SentScene | LoadedSequence> {
   const { onProgress, onPreview, onReading, askForHelp } = listeners;
   try {
     const { url, credentials } = request;

@@ -7,7 +7,14 @@ import type { SceneBounds } from '../camera/settings.js';
 import type { FloorOptions } from '@gaussian-splat/formats/walk';
 import type { ClipPart, LoadLimits, SceneSequence, TriangleFile } from '@gaussian-splat/formats';
 import type { PackedGaussians, StreamedScene } from '@gaussian-splat/renderer';
-import type { CodedFile, LevelPage, LevelScene, ShPrecision } from '@gaussian-splat/renderer/tools';
+import type {
+  CodedFile,
+  LevelPage,
+  LevelScene,
+  PackedHead,
+  PackedPortion,
+  ShPrecision,
+} from '@gaussian-splat/renderer/tools';
 
 /** A scene file, and the body that walks in it. */
 export interface FloorRequest extends FileRequest {
@@ -59,9 +66,8 @@ export interface SceneRequest extends FileRequest {
   readonly chain?: readonly string[];
 }
 
-/** A scene, fetched and packed, ready for upload. */
-export interface LoadedScene {
-  readonly packed: PackedGaussians;
+/** A scene that has been fetched, but for its splats. */
+export interface LoadedFacts {
   readonly bounds: SceneBounds;
   /** What of the file is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
@@ -70,6 +76,22 @@ export interface LoadedScene {
   /** The file has triangles, too. */
   readonly hasMeshes?: boolean | undefined;
 }
+
+/** A scene, fetched and packed, ready for upload. */
+export interface LoadedScene extends LoadedFacts {
+  readonly packed: PackedGaussians;
+}
+
+/** A scene whose splats came before it, as {@link ScenePart}s. */
+export interface SentScene extends LoadedFacts {
+  readonly packed?: undefined;
+}
+
+/** Of a scene that is uploaded while its splats are put in order: the head comes first, and again if the load begins again. */
+export type ScenePart = { readonly head: PackedHead } | { readonly portion: PackedPortion };
+
+/** Called with each part. The last one holds the bounds of all chunks. */
+export type PartListener = (part: ScenePart) => void;
 
 /** The triangles of a file, checked, with its images decoded. */
 export interface LoadedMesh extends Omit<TriangleFile, 'images'> {
@@ -145,7 +167,12 @@ export type ProgressListener = (loaded: number, total: number | undefined, share
 
 /** What a worker may be asked for; every request gets a number, and one `answer` or `error`. */
 export type WorkerRequest =
-  | { readonly type: 'load'; readonly request: SceneRequest; readonly wantsPreviews: boolean }
+  | {
+      readonly type: 'load';
+      readonly request: SceneRequest;
+      readonly wantsPreviews: boolean;
+      readonly wantsParts: boolean;
+    }
   | { readonly type: 'levels'; readonly packed: PackedGaussians }
   | { readonly type: 'file'; readonly request: FileRequest }
   | { readonly type: 'manifest'; readonly request: FileRequest }
@@ -187,6 +214,7 @@ export type WorkerMessage =
   | { readonly type: 'help'; readonly id: number; readonly most: number }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
+  | { readonly type: 'part'; readonly id: number; readonly part: ScenePart }
   | { readonly type: 'answer'; readonly id: number; readonly answer: unknown }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };
 

@@ -4,9 +4,11 @@ import type {
   FileRequest,
   LoadedScene,
   LoadedSequence,
+  PartListener,
   PreviewListener,
   ProgressListener,
   SceneRequest,
+  SentScene,
   WorkerRequest,
 } from './protocol.js';
 import type * as workerModule from './scene-worker.js';
@@ -76,18 +78,35 @@ export class SceneLoader {
     return loaded;
   }
 
-  /** The same for an address that may name a sequence: then its manifest is what comes. */
+  /**
+   * The same for an address that may name a sequence: then its manifest is what comes.
+   * @param onPart takes the splats of a large scene, which then come before it: see {@link SentScene}.
+   */
   open(
     request: SceneRequest,
     signal: AbortSignal,
     onProgress: ProgressListener,
     onPreview?: PreviewListener,
-  ): Promise<LoadedScene | LoadedSequence> {
+  ): Promise<LoadedScene | LoadedSequence>;
+  open(
+    request: SceneRequest,
+    signal: AbortSignal,
+    onProgress: ProgressListener,
+    onPreview: PreviewListener | undefined,
+    onPart: PartListener,
+  ): Promise<LoadedScene | SentScene | LoadedSequence>;
+  open(
+    request: SceneRequest,
+    signal: AbortSignal,
+    onProgress: ProgressListener,
+    onPreview?: PreviewListener,
+    onPart?: PartListener,
+  ): Promise<LoadedScene | SentScene | LoadedSequence> {
     return this.ask(
-      { type: 'load', request, wantsPreviews: onPreview !== undefined },
+      { type: 'load', request, wantsPreviews: onPreview !== undefined, wantsParts: onPart !== undefined },
       signal,
       ({ loadScene }) => loadScene(request, signal, { onProgress, onPreview }),
-      { onProgress, onPreview },
+      { onProgress, onPreview, onPart },
     );
   }
 

@@ -121,13 +121,16 @@ function serve(scope: WorkerScope): void {
       onPreview: message.wantsPreviews
         ? (preview) => scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed))
         : undefined,
+      onPart: message.wantsParts
+        ? (part) => scope.postMessage({ type: 'part', id, part }, 'portion' in part ? buffersOf(part.portion) : [])
+        : undefined,
       onReading: (isReading) => scope.postMessage({ type: isReading ? 'reading' : 'rested', id }),
       askForHelp: (most, onHelper) => {
         work.onHelper = onHelper;
         scope.postMessage({ type: 'help', id, most });
       },
     });
-    return [scene, 'frames' in scene ? [] : buffersOf(scene.packed)];
+    return [scene, 'packed' in scene && scene.packed ? buffersOf(scene.packed) : []];
   }
 
   const progressOf =

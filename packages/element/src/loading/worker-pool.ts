@@ -79,7 +79,7 @@ export class WorkerPool {
     request: WorkerRequest,
     signal: AbortSignal,
     here: () => Promise<T>,
-    { transfer, ...listeners }: Pick<Job, 'onProgress' | 'onPreview' | 'transfer'> = {},
+    { transfer, ...listeners }: Pick<Job, 'onProgress' | 'onPreview' | 'onPart' | 'transfer'> = {},
   ): Promise<T> {
     signal.throwIfAborted();
     let cancel!: () => void;
@@ -173,6 +173,7 @@ export class WorkerPool {
     const job = slot.jobs.get(message.id);
     if (message.type === 'progress') job?.onProgress?.(message.loaded, message.total);
     else if (message.type === 'preview') job?.onPreview?.(message.scene);
+    else if (message.type === 'part') job?.onPart?.(message.part);
     else if (message.type === 'answer') job?.resolve(message.answer);
     else if (message.type === 'error') job?.reject(GaussianSplatError.fromData(message.error));
     else if (job) this.#help(slot, job.id, message.most).catch(() => undefined);

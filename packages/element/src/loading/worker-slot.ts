@@ -1,4 +1,4 @@
-import type { PageMessage, PreviewListener, ProgressListener, WorkerRequest } from './protocol.js';
+import type { PageMessage, PartListener, PreviewListener, ProgressListener, WorkerRequest } from './protocol.js';
 
 /** What a worker is asked for. */
 export interface Job {
@@ -6,6 +6,7 @@ export interface Job {
   readonly request: WorkerRequest;
   readonly onProgress?: ProgressListener | undefined;
   readonly onPreview?: PreviewListener | undefined;
+  readonly onPart?: PartListener | undefined;
   /** Buffers that go with the request, which can then be sent only once. */
   readonly transfer?: Transferable[] | undefined;
   /** Does the work on the page's own thread. */

@@ -24,10 +24,8 @@ export interface PackOptions {
   readonly sh?: ShPrecision | 'auto';
 }
 
-/**
- * A cloud in the exact bytes that the GPU reads. Plain data with transferable buffers, so that a worker can make it.
- */
-export interface PackedGaussians {
+/** Packed Gaussians but for their bytes. */
+export interface PackedHead {
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
@@ -36,6 +34,14 @@ export interface PackedGaussians {
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly droppedCount: number;
+  /** Splats of the finest level, which come first, if there are levels of detail. */
+  readonly leafCount?: number;
+}
+
+/**
+ * A cloud in the exact bytes that the GPU reads. Plain data with transferable buffers, so that a worker can make it.
+ */
+export interface PackedGaussians extends PackedHead {
   /** [N, 8] words: `PackedGaussian` of shaders/shared/packed_gaussian.wgsl. */
   readonly geometry: Uint32Array;
   /** [N, {@link shWords}] words: see shaders/shared/sh.wgsl. */
@@ -44,8 +50,6 @@ export interface PackedGaussians {
   readonly chunks: Float32Array;
   /** [ceil(N / 256), 12] numbers, if there are levels of detail: `ChunkDetail` of shaders/shared/detail.wgsl. */
   readonly details?: Float32Array;
-  /** Splats of the finest level, which come first, if there are levels of detail. */
-  readonly leafCount?: number;
 }
 
 const { ALPHA_MIN } = constants;

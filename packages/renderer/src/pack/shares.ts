@@ -13,7 +13,7 @@ import {
 import { constants } from '../generated/shaders.js';
 import { reachOf } from './chunks.js';
 import { codesAlong, curveThrough, isOfPlanes, type Curve } from './morton.js';
-import { packGeometry, usableIndices, type PackedGaussians, type PackOptions } from './pack.js';
+import { packGeometry, usableIndices, type PackedGaussians, type PackedHead, type PackOptions } from './pack.js';
 import { recentred } from './recentre.js';
 import { sortByKey } from './radix-sort.js';
 import { noiseIn, packSh, PART, precisionFor } from './sh.js';
@@ -222,9 +222,10 @@ export class ShareCells {
       const bytes = 4 * stride * count;
       const words = new Uint32Array(room.byteLength < bytes ? new ArrayBuffer(bytes) : room, 0, stride * count);
       let at = 0;
-      // A view for each of some 100,000 ranges would cost more than this loop.
-      for (const { share, first, end } of ranges)
-        for (let from = stride * first; from < stride * end;) words[at++] = share.words[from++];
+      for (const { share, first, end } of ranges) {
+        words.set(share.words.subarray(stride * first, stride * end), at);
+        at += stride * (end - first);
+      }
       return { layout, start, count, words };
     };
     return { start, count, block };
@@ -294,74 +295,80 @@ function grow(chunks: Float32Array, at: number, floats: Float32Array, from: numb
 
 /** A scene of which blocks come in any order. */
 export class JoinedBlocks {
-  readonly #layout: ShareLayout;
+  /** What is known of the scene before its blocks come. */
+  readonly head: PackedHead;
+  /** Bounds of all chunks, once all blocks are there. */
+  readonly chunks: Float32Array<ArrayBuffer>;
+  readonly #send: ((block: SortedBlock) => void) | undefined;
   readonly #geometry: Uint32Array;
   readonly #sh: Uint32Array;
-  readonly #chunks: Float32Array;
-  readonly #count: number;
+  readonly #step: number;
+  /** Geometry of every {@link #step}-th splat. */
+  readonly #sample: Uint32Array;
 
-  /** @param count splats of all blocks */
-  constructor(layout: ShareLayout, count: number) {
-    this.#layout = layout;
-    this.#geometry = new Uint32Array(GEOMETRY_WORDS * count);
-    this.#sh = new Uint32Array(shWords(layout.shDegree, layout.shPrecision) * count);
-    this.#chunks = emptyChunks(Math.ceil(count / CULL_GROUP));
-    this.#count = count;
+  /**
+   * @param count splats of all blocks
+   * @param send gets each block as it comes; without it their words are joined
+   */
+  constructor(layout: ShareLayout, count: number, facts: ShareFacts, send?: (block: SortedBlock) => void) {
+    const { shDegree, shPrecision, moved } = layout;
+    const origin = facts.origin.map((x, axis) => x + moved[axis]) as unknown as Vector3;
+    this.head = { count, shDegree, shPrecision, ...facts, origin };
+    this.chunks = emptyChunks(Math.ceil(count / CULL_GROUP));
+    this.#send = send;
+    const kept = send ? 0 : count;
+    this.#geometry = new Uint32Array(GEOMETRY_WORDS * kept);
+    this.#sh = new Uint32Array(shWords(shDegree, shPrecision) * kept);
+    this.#step = Math.max(1, Math.floor(count / SAMPLE));
+    this.#sample = new Uint32Array(GEOMETRY_WORDS * Math.ceil(count / this.#step));
   }
 
-  add({ start, geometry, sh, chunks }: SortedBlock): void {
-    this.#geometry.set(geometry, GEOMETRY_WORDS * start);
-    this.#sh.set(sh, shWords(this.#layout.shDegree, this.#layout.shPrecision) * start);
+  add(block: SortedBlock): void {
+    const { start, geometry, sh, chunks } = block;
     const first = CHUNK_NUMBERS * Math.floor(start / CULL_GROUP);
     for (let at = 0; at < chunks.length; at += CHUNK_NUMBERS) {
-      grow(this.#chunks, first + at, chunks, at, chunks[at + 3]);
-      grow(this.#chunks, first + at, chunks, at + 4, 0);
+      grow(this.chunks, first + at, chunks, at, chunks[at + 3]);
+      grow(this.chunks, first + at, chunks, at + 4, 0);
     }
+    const [step, end] = [this.#step, start + geometry.length / GEOMETRY_WORDS];
+    for (let k = Math.ceil(start / step); k * step < end; k++) {
+      const from = GEOMETRY_WORDS * (k * step - start);
+      this.#sample.set(geometry.subarray(from, from + GEOMETRY_WORDS), GEOMETRY_WORDS * k);
+    }
+    if (this.#send) return this.#send(block);
+    this.#geometry.set(geometry, GEOMETRY_WORDS * start);
+    this.#sh.set(sh, shWords(this.head.shDegree, this.head.shPrecision) * start);
   }
 
   /** The scene, to the byte what `packGaussians` makes of it if the layout is that of the whole scene. */
-  finish(facts: ShareFacts): PackedGaussians {
-    const { shDegree, shPrecision, moved } = this.#layout;
-    return {
-      ...{ count: this.#count, shDegree, shPrecision },
-      ...facts,
-      origin: facts.origin.map((x, axis) => x + moved[axis]) as unknown as Vector3,
-      ...{ geometry: this.#geometry, sh: this.#sh, chunks: this.#chunks },
+  get packed(): PackedGaussians {
+    return { ...this.head, geometry: this.#geometry, sh: this.#sh, chunks: this.chunks };
+  }
+
+  /** Bounds of the scene: its box to the bit, the rest from a sample of its splats. */
+  get bounds(): Bounds {
+    const { origin } = this.head;
+    const edge = (first: number, farther: (a: number, b: number) => number): Vector3 => {
+      const corner = [first, first, first];
+      for (let at = 0; at < this.chunks.length; at += CHUNK_NUMBERS)
+        for (let axis = 0; axis < 3; axis++)
+          corner[axis] = farther(corner[axis], this.chunks[at + axis + (first > 0 ? 0 : 4)]);
+      return corner.map((x, axis) => x + origin[axis]) as unknown as Vector3;
     };
+    const sample = boundsOf({ ...unpacked(this.#sample), origin });
+    return { ...sample, min: edge(Infinity, Math.min), max: edge(-Infinity, Math.max) };
   }
 }
 
-/** Splats whose places tell those of all. */
+/** Splats whose positions stand for those of all. */
 const SAMPLE = 65_536;
 
-/** Positions and opacities of evenly spaced splats. */
-function sampleOf({
-  count,
-  geometry,
-}: Pick<PackedGaussians, 'count' | 'geometry'>): Pick<GaussianCloud, 'count' | 'positions' | 'opacities'> {
-  const step = Math.max(1, Math.floor(count / SAMPLE));
-  const taken = Math.ceil(count / step);
-  const positions = new Float32Array(3 * taken);
-  const factors = new Float32Array(6 * taken);
-  const opacities = new Float32Array(taken);
-  const words = new Uint32Array(GEOMETRY_WORDS * taken);
-  for (let k = 0; k < taken; k++) {
-    const from = GEOMETRY_WORDS * step * k;
-    words.set(geometry.subarray(from, from + GEOMETRY_WORDS), GEOMETRY_WORDS * k);
-    unpackSplat(words, k, positions, factors, opacities);
-  }
-  return { count: taken, positions, opacities };
-}
-
-/** Bounds of a scene: its box to the bit, the rest from a sample of its splats. */
-export function boundsOfPacked(packed: PackedGaussians): Bounds {
-  const bounds = boundsOf({ ...sampleOf(packed), origin: packed.origin });
-  const edge = (first: number, farther: (a: number, b: number) => number): Vector3 => {
-    const corner = [first, first, first];
-    for (let at = 0; at < packed.chunks.length; at += CHUNK_NUMBERS)
-      for (let axis = 0; axis < 3; axis++)
-        corner[axis] = farther(corner[axis], packed.chunks[at + axis + (first > 0 ? 0 : 4)]);
-    return corner.map((x, axis) => x + packed.origin[axis]) as unknown as Vector3;
-  };
-  return { ...bounds, min: edge(Infinity, Math.min), max: edge(-Infinity, Math.max) };
+/** Positions and opacities of some splats. @param geometry [N, GEOMETRY_WORDS] */
+function unpacked(geometry: Uint32Array): Pick<GaussianCloud, 'count' | 'positions' | 'opacities'> {
+  const count = geometry.length / GEOMETRY_WORDS;
+  const positions = new Float32Array(3 * count);
+  const factors = new Float32Array(6 * count);
+  const opacities = new Float32Array(count);
+  for (let k = 0; k < count; k++) unpackSplat(geometry, k, positions, factors, opacities);
+  return { count, positions, opacities };
 }
