@@ -45,7 +45,7 @@ export class GaussianBuffers implements GaussianScene {
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
 
-  private constructor(device: GPUDevice, packed: PackedHead, memoryBudget?: number, budget?: DetailBudget) {
+  private constructor(device: GPUDevice, packed: SceneSize, memoryBudget?: number, budget?: DetailBudget) {
     this.detailBudget = budget;
     this.#queue = device.queue;
     ({
@@ -58,11 +58,10 @@ export class GaussianBuffers implements GaussianScene {
       droppedCount: this.droppedCount,
       leafCount: this.leafCount,
     } = packed);
-    const hasDetails = budget !== undefined;
-    this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), sceneBytes(packed, hasDetails), memoryBudget);
+    this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), sceneBytes(packed), memoryBudget);
     this.#memory = new GpuMemory(device);
     try {
-      this.pages = makePages(device, packed, hasDetails, this.#memory);
+      this.pages = makePages(device, packed, this.#memory);
     } catch (error) {
       this.destroy();
       throw error;
@@ -88,7 +87,7 @@ export class GaussianBuffers implements GaussianScene {
   /** Allocates the buffers of a scene whose bytes come in portions: see {@link write}. Rejects as {@link upload} does. */
   static allocate(
     device: GPUDevice,
-    packed: PackedHead,
+    packed: SceneSize,
     { memoryBudget }: UploadOptions = {},
     budget?: DetailBudget,
   ): Promise<GaussianBuffers> {
@@ -165,14 +164,17 @@ function wordsOf(
   return new Uint32Array(buffer as ArrayBuffer, byteOffset + 4 * from, Math.min(count, length - from));
 }
 
+/** What the bytes of a scene follow from. */
+type SceneSize = PackedHead & Pick<PackedGaussians, 'details'>;
+
 /** Bytes that a scene takes on the GPU. */
-export function sceneBytes({ count, shDegree, shPrecision }: PackedHead, hasDetails = false): number {
-  const perChunk = CHUNK_NUMBERS + (hasDetails ? DETAIL_NUMBERS : 0);
+export function sceneBytes({ count, shDegree, shPrecision, details }: SceneSize): number {
+  const perChunk = CHUNK_NUMBERS + (details ? DETAIL_NUMBERS : 0);
   const words = GEOMETRY_WORDS + shWords(shDegree, shPrecision);
   return 4 * (words * count + perChunk * Math.ceil(count / constants.CULL_GROUP));
 }
 
-function makePages(device: GPUDevice, packed: PackedHead, hasDetails: boolean, memory: GpuMemory): GaussianPage[] {
+function makePages(device: GPUDevice, packed: SceneSize, memory: GpuMemory): GaussianPage[] {
   const shStride = shWords(packed.shDegree, packed.shPrecision);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
@@ -186,7 +188,7 @@ function makePages(device: GPUDevice, packed: PackedHead, hasDetails: boolean, m
       geometry: part('geometry', GEOMETRY_WORDS * count),
       sh: part('sh', shStride * count),
       chunks: part('chunks', CHUNK_NUMBERS * chunks),
-      details: hasDetails ? part('details', DETAIL_NUMBERS * chunks) : undefined,
+      details: packed.details ? part('details', DETAIL_NUMBERS * chunks) : undefined,
     });
   }
   return pages;

@@ -1,5 +1,6 @@
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { startVariants } from '@gaussian-splat/renderer';
+import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import type { LiveRequest } from '../live/live-model.js';
 import type { FileRequest, LoadedSequence, PartListener, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -10,7 +11,7 @@ import type { PartUploads } from './part-uploads.js';
 import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu, why } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
-import { byteLengthOf, shown, upload } from './upload.js';
+import { shown, upload } from './upload.js';
 import { canvasFormat } from './viewport.js';
 
 export interface OpenOptions {
@@ -99,7 +100,7 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
     const [lease, scene] = await Promise.all([acquiring, loading, device]);
     if ('frames' in scene) return await openSequence(request, lease, scene, options);
     if (scene.packed === undefined) return shown(lease, await (await parts!).finish(), scene, options);
-    beforeUpload(byteLengthOf(scene));
+    beforeUpload(sceneBytes(scene.packed));
     return await upload(lease, scene, options);
   } catch (error) {
     previews?.end();

@@ -30,11 +30,3 @@ export const shown = (
   { bounds, warnings, order, hasMeshes }: LoadedFacts,
   { submissions }: Pick<SceneUploadOptions, 'submissions'>,
 ): LoadedGaussians => new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, order, hasMeshes });
-
-/** Bytes that a scene takes on the GPU, all but exactly. */
-export function byteLengthOf({ packed }: LoadedScene): number {
-  return Object.values(packed).reduce<number>(
-    (sum, value) => sum + (ArrayBuffer.isView(value) ? value.byteLength : 0),
-    0,
-  );
-}
