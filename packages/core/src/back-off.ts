@@ -1,15 +1,15 @@
 export interface BackOffOptions {
   /** Milliseconds of the pause after the first failure. */
   readonly firstMs: number;
-  /** How many times as long each further pause is. */
+  /** Growth factor of the pauses. */
   readonly factor: number;
-  /** Failures in a row after which there is no other try. */
+  /** Number of consecutive failures after which no more attempts follow. */
   readonly mostTries: number;
-  /** Milliseconds since any moment. Default: `performance.now`. */
+  /** Milliseconds from any origin. Default: `performance.now`. */
   readonly now?: (() => number) | undefined;
 }
 
-/** Of what has failed: how often in a row, and when it may be tried again. */
+/** Counts consecutive failures, and delays the next attempt. */
 export class BackOff<K> {
   readonly #options: BackOffOptions;
   readonly #failures = new Map<K, { times: number; until: number; isTaken: boolean }>();
@@ -18,7 +18,7 @@ export class BackOff<K> {
     this.#options = options;
   }
 
-  /** @returns how often it has failed in a row */
+  /** @returns Number of consecutive failures. */
   fail(key: K): number {
     const { firstMs, factor, mostTries } = this.#options;
     const times = (this.#failures.get(key)?.times ?? 0) + 1;
@@ -31,12 +31,12 @@ export class BackOff<K> {
     this.#failures.delete(key);
   }
 
-  /** Whether it is not to be tried now. */
+  /** Whether the next attempt must wait. */
   isPaused(key: K): boolean {
     return this.#now() < (this.#failures.get(key)?.until ?? -Infinity);
   }
 
-  /** Those whose pause has ended since the last call. @returns them, and whether the pause of others will end */
+  /** Returns the keys whose pause has ended since the last call, and whether others are still pausing. */
   takeDue(): { readonly due: K[]; readonly isMore: boolean } {
     const due: K[] = [];
     let isMore = false;

@@ -1,39 +1,42 @@
 import type { GaussianCloud } from './gaussian-cloud.js';
 import type { Vector3 } from './vector.js';
 
-/** A ball, in world units. */
+/** A sphere, in world units. */
 export interface Ball {
   readonly center: Vector3;
   readonly radius: number;
 }
 
-/** Where the splats of a cloud are, in world units. */
+/** Bounds of the splats of a cloud, in world units. */
 export interface Bounds {
-  /** Axis-aligned box of the centres. */
+  /** Axis-aligned box of the centers. */
   readonly min: Vector3;
   readonly max: Vector3;
-  /** Middle of the subject: per-axis median of the opaque centres, which far outliers do not move. */
+  /** Center of the subject: per-axis median of the opaque centers, which is robust to outliers. */
   readonly center: Vector3;
-  /** Distance from {@link center} within which 90 % of the opaque centres lie. */
+  /** Distance from {@link center} that contains 90 % of the opaque centers. */
   readonly radius: number;
   /**
-   * All of a subject that stands alone, as captures do whose background was cut off, and avatars: a ball around all opaque centres but one in a thousand. Left out where
-   * surroundings thin out around a subject.
+   * Sphere around an isolated subject, such as a capture with its background removed, or an avatar: it contains 99.9 %
+   * of the opaque centers. Missing if the density of the surroundings decreases gradually.
    */
   readonly subject?: Ball;
 }
 
-/** Centres at most this many are sampled for medians: sorting millions would stall loading for no visible gain. */
+/**
+ * Maximum number of centers that are sampled for medians, because sorting millions would delay loading without visible
+ * benefit.
+ */
 const SAMPLE_LIMIT = 65_536;
-/** Share of the opaque centres that a subject has: others are specks that cutting has left. */
+/** Fraction of the opaque centers that belong to a subject; the rest are specks that removing a background leaves. */
 const OF_SUBJECT = 0.999;
 /**
- * A subject that stands alone ends so many times as far from its middle as 99 % of its centres, at most: 1 to 1.3 in six such captures. Surroundings go on: 2.9 in
- * a capture as it was trained.
+ * Maximum ratio of the distances that contain all centers and 99 % of them, for an isolated subject. It is 1 to 1.3 in
+ * six such captures, and 2.9 in a capture with surroundings.
  */
 const ENDS_WITHIN = 1.5;
 
-/** Bounds of a cloud; of an empty one, a unit ball at its origin. */
+/** Returns the bounds of a cloud; for an empty one, a unit sphere at its origin. */
 export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opacities' | 'origin'>): Bounds {
   const { count, positions, opacities, origin } = cloud;
   if (count === 0) return { min: origin, max: origin, center: origin, radius: 1 };
@@ -56,7 +59,7 @@ export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opa
 const distance = (a: ArrayLike<number>, b: ArrayLike<number>): number =>
   Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
-/** Least and largest coordinates of rows of three. */
+/** Minimum and maximum coordinates over rows of three. */
 function boxOf(positions: Float32Array): [number[], number[]] {
   const [min, max] = [
     [Infinity, Infinity, Infinity],
@@ -75,7 +78,7 @@ function boxOf(positions: Float32Array): [number[], number[]] {
   return [min, max];
 }
 
-/** A ball around the middle of the places' box. */
+/** A sphere around the center of the points' box. */
 function ballAround(places: readonly Float32Array[]): { center: number[]; radius: number } {
   const center = [0, 1, 2].map((axis) => {
     const [least, most] = places.reduce(

@@ -2,8 +2,8 @@ import { GaussianSplatError } from './errors.js';
 import { cross, dot, eyeOf, normalize, subtract, type Matrix4, type Vector3 } from './vector.js';
 
 /**
- * A pinhole camera in OpenCV's convention: x right, y down, z forward; pixel centres at +0.5.
- * A world point p lands on the pixel (fx·x/z + cx, fy·y/z + cy) with (x, y, z) = worldToCamera · p.
+ * A pinhole camera in OpenCV's convention: x right, y down, z forward; pixel centers at +0.5. A world point p projects
+ * to the pixel (fx·x/z + cx, fy·y/z + cy) with (x, y, z) = worldToCamera · p.
  */
 export interface Camera {
   /** Image size in pixels. */
@@ -17,30 +17,30 @@ export interface Camera {
   readonly cy: number;
   /** World to camera, row-major 4x4, last row (0, 0, 0, 1), float64. */
   readonly worldToCamera: Matrix4;
-  /** Centres nearer than this, in world units along z, are not drawn. */
+  /** Centers nearer than this, in world units along z, are not drawn. */
   readonly near: number;
-  /** Centres farther than this, in world units along z, are not drawn. */
+  /** Centers farther than this, in world units along z, are not drawn. */
   readonly far: number;
   /**
-   * True if all rays are parallel to the camera's axis: a world point lands on (fx·x + cx, fy·y + cy), and focal lengths are pixels for each world
-   * unit. Default: false.
+   * Whether all rays are parallel to the optical axis: a world point then projects to (fx·x + cx, fy·y + cy), and focal
+   * lengths are in pixels per world unit. Default: false.
    */
   readonly orthographic?: boolean | undefined;
 }
 
-/** Near plane of INRIA's rasterizer, which scenes are trained with, in world units. */
+/** Near plane of INRIA's rasterizer, used in training, in world units. */
 export const DEFAULT_NEAR = 0.2;
 /** Far plane of gsplat, in world units. */
 export const DEFAULT_FAR = 1e10;
 
-/** A camera as calibration files write it, for example one view of a `cameras.json`. */
+/** A camera in the layout of calibration files, for example one view of a `cameras.json`. */
 export interface CalibratedView {
   /** Pixels. */
   readonly width: number;
   readonly height: number;
   /** 3x3 intrinsics [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels. */
   readonly K: readonly (readonly number[])[];
-  /** 4x4 world to camera, rows outermost, OpenCV axes. */
+  /** 4x4 world to camera, row-major, OpenCV axes. */
   readonly worldToCamera: readonly (readonly number[])[];
   /** World units; default {@link DEFAULT_NEAR}. */
   readonly near?: number;
@@ -48,7 +48,7 @@ export interface CalibratedView {
   readonly far?: number;
 }
 
-/** Reads a calibrated view, checking every field; throws `argument/camera`. `where` names its source in the error. */
+/** Reads a calibrated view and validates every field; throws `argument/camera`. `where` names its source in the error. */
 export function cameraFromCalibration(view: CalibratedView, where = 'camera'): Camera {
   const { width, height, K, worldToCamera } = view ?? {};
   const isMatrix = (m: unknown, size: number): boolean =>
@@ -69,7 +69,7 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
   };
   validateCamera(camera, where);
   if (K[0][1] !== 0) failCamera(`${where}.K[0][1]`, '0 (no skew)', describeCamera(K[0][1]));
-  // A matrix of columns, or a scaled one, would be taken for one with another middle or other focal lengths.
+  // Column-major or scaled matrices would be misread as another principal point or other focal lengths.
   for (const [row, column, value] of [
     [2, 0, 0],
     [2, 1, 0],
@@ -83,7 +83,7 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
   return camera;
 }
 
-/** How far the last row of a matrix may be from 0, 0, 0, 1. */
+/** Tolerance of the last row of a matrix against 0, 0, 0, 1. */
 const AFFINE_ROUNDING = 1e-6;
 
 /** Throws `argument/camera` if a field of the camera is out of its documented range. */
@@ -113,14 +113,14 @@ export function validateCamera(camera: Camera, where = 'camera'): void {
       describeCamera([x, y, z, w]),
     );
   }
-  // A camera that makes space flat is nowhere.
+  // The matrix of a camera must be invertible.
   if (!eyeOf(worldToCamera).every(Number.isFinite))
     failCamera(`${where}.worldToCamera`, 'a matrix that can be inverted', describeCamera([...worldToCamera]));
 }
 
 /**
- * World-to-camera matrix (row-major, OpenCV axes) of an eye that looks at a target.
- * @param up direction that points up in the image; must not be parallel to the line of sight.
+ * Returns the world-to-camera matrix (row-major, OpenCV axes) of an eye that looks at a target.
+ * @param up Direction that points up in the image; must not be parallel to the line of sight.
  */
 export function lookAt(eye: Vector3, target: Vector3, up: Vector3): Float64Array {
   const forward = normalize(subtract(target, eye));

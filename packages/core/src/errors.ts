@@ -1,10 +1,8 @@
-/**
- * Errors for people: what was expected, what was found, where, and what to do; with a code that never changes.
- */
+/** Errors for users state the expected value, the found one, the place, and a remedy, with a stable code. */
 
 /** Stable codes. The part before the slash is the family that `<gaussian-splat>` reports as `error.code`. */
 export type ErrorCode =
-  /** The bytes are not a Gaussian splat scene that any reader knows. */
+  /** The bytes are not a Gaussian splat scene in any known format. */
   | 'decode/unknown-format'
   /** The file is a web page (often a 404 or a login page served with status 200). */
   | 'decode/html'
@@ -14,19 +12,22 @@ export type ErrorCode =
   | 'decode/not-splats'
   /** The header of a known format contradicts itself or its specification. */
   | 'decode/header'
-  /** The file ends before the data that its header announces. */
+  /** The file ends before the data that its header declares. */
   | 'decode/truncated'
   /** The body contradicts the header, or a compressed stream is damaged. */
   | 'decode/corrupt'
-  /** A known format, in a version or variant that this reader does not read. */
+  /** A known format, in a version or variant that this reader does not support. */
   | 'decode/unsupported'
   /** A scene file with no valid splat in it. */
   | 'decode/empty'
-  /** The server could not be reached, or the browser refused the answer (CORS, mixed content, offline): of a scene, or of code that is loaded when it is needed. */
+  /**
+   * The server could not be reached, or the browser blocked the response (CORS, mixed content, offline): for a scene,
+   * or for code that is loaded on demand.
+   */
   | 'network/unreachable'
   /** The server answered with an HTTP error status. */
   | 'network/status'
-  /** The connection broke off before the last byte. */
+  /** The connection ended before the last byte. */
   | 'network/interrupted'
   /** The URL cannot be parsed. */
   | 'network/url'
@@ -35,66 +36,72 @@ export type ErrorCode =
   | 'unsupported/no-webgpu'
   | 'unsupported/no-adapter'
   | 'unsupported/limits'
-  /** A script of the page has replaced a function of the language by another. */
+  /** A script of the page has replaced a built-in function of JavaScript. */
   | 'unsupported/page'
-  /** Every variant of the renderer fails its known answer on this device: its shader compiler or driver errs. */
+  /** Every variant of the renderer fails its self-test on this device: the shader compiler or driver is faulty. */
   | 'unsupported/wrong-image'
-  /** There is no WebGPU, and WebGL 2 in its place cannot show what is asked for, or fails. */
+  /** WebGPU is unavailable, and WebGL 2 cannot show the requested content, or fails. */
   | 'unsupported/webgl'
-  /** There is no session of VR or AR: no device, no browser for it, or the page may not. */
+  /** A VR or AR session is unavailable: no device, no browser support, or no permission. */
   | 'unsupported/xr'
   /** The scene needs more GPU memory than a buffer or the device may hold. */
   | 'out-of-memory/buffer-limit'
   | 'out-of-memory/budget'
   | 'out-of-memory/allocation'
-  /** The GPU device was lost and could not be brought back. */
+  /** The GPU device was lost and could not be recovered. */
   | 'device-lost/unrecoverable'
-  /** An ONNX file and its Gaussian Generator contract do not fit: see `ContractError`, and docs/contract.md for each. */
+  /**
+   * An ONNX file and its Gaussian Generator contract do not match: see `ContractError`, and docs/contract.md for each
+   * code.
+   */
   | ContractErrorCode
-  /** A caller's argument breaks the documented contract of a function. */
+  /** A caller's argument violates the documented contract of a function. */
   | 'argument/camera'
   | 'argument/cloud'
-  /** A function of a page for its splats is not WGSL that compiles. */
+  /** A page's hook for splats is not WGSL that compiles. */
   | 'argument/splat-shader'
-  /** A method was called outside of a person's click. */
+  /** A method was called outside of a user activation. */
   | 'argument/activation'
   | 'argument/value';
 
-/** Stable codes of everything that can be wrong between an ONNX file, its contract and what it writes. */
+/** Stable codes of all faults of an ONNX file, its contract and its output. */
 export type ContractErrorCode =
   /** The contract cannot be read as JSON. */
   | 'contract/json'
-  /** A field of the contract is missing, unknown, or not what the schema asks for. */
+  /** A field of the contract is missing, unknown, or invalid under the schema. */
   | 'contract/schema'
-  /** The contract is of a version that this reader does not know. */
+  /** The version of the contract is not supported by this reader. */
   | 'contract/version'
-  /** There is no contract, and the names of inputs and outputs do not say enough to infer one. */
+  /** There is no contract, and the names of inputs and outputs are too ambiguous to infer one. */
   | 'contract/inference'
   /** An input of the ONNX file has no role in the contract. */
   | 'contract/unbound-input'
   /** The contract names a tensor that the ONNX file does not have. */
   | 'contract/missing-tensor'
-  /** A tensor's shape is not the one that its role asks for. */
+  /** The shape of a tensor does not match its role. */
   | 'contract/shape'
-  /** A tensor's element type is not one that its role allows, or not the one that the contract declares. */
+  /** The element type of a tensor does not match its role, or the type that the contract declares. */
   | 'contract/dtype'
   /** Outputs disagree on the number of Gaussians, or it is above `nMax`, or symbolic without `nMax`. */
   | 'contract/rows'
-  /** The degree of spherical harmonics that the shape tells is none, or not the one declared. */
+  /** The shape does not match a degree of spherical harmonics, or not the declared one. */
   | 'contract/sh-degree'
-  /** A model of several instances whose axis is not where it must be, or whose instances come out differently in one run and in several. */
+  /**
+   * The axis of a model of several instances is misplaced, or the results of an instance differ between one run and
+   * several.
+   */
   | 'contract/instances'
-  /** Facts within one contract contradict each other. */
+  /** Fields of one contract contradict each other. */
   | 'contract/conflict'
-  /** The file asks for an IR version or an opset newer than the runtime knows. */
+  /** The file requires an IR version or an opset that is newer than the runtime supports. */
   | 'contract/opset'
   /** The file uses an operator of a domain that the runtime does not have. */
   | 'contract/operator'
   /** A file with external data is missing, too short, or outside the model's folder. */
   | 'contract/external-data'
-  /** The runtime refused or failed to run the model. */
+  /** The runtime rejected or failed to run the model. */
   | 'contract/run'
-  /** A value is NaN or infinite where it must be finite. */
+  /** A value is NaN or infinite but must be finite. */
   | 'contract/not-finite'
   /** A covariance is not positive semi-definite, or a scale is negative, or a rotation is zero. */
   | 'contract/covariance'
@@ -102,26 +109,26 @@ export type ContractErrorCode =
   | 'contract/opacity'
   /** The live count is negative or above the number of rows. */
   | 'contract/count'
-  /** The same inputs gave other outputs although no input is a seed. */
+  /** The same inputs gave different outputs although no input is a seed. */
   | 'contract/not-deterministic'
-  /** Models of a chain do not fit one another, or stand where they cannot. */
+  /** Models of a chain do not match one another, or are in an invalid position. */
   | 'contract/chain';
 
-/** What a person needs to mend the fault. Every field is a full phrase without a trailing full stop. */
+/** Information for fixing the fault. Every field is a full phrase without a trailing full stop. */
 export interface ErrorDetails {
-  /** What was expected. */
+  /** The expected value. */
   readonly expected: string;
-  /** What was found instead. */
+  /** The found value. */
   readonly found: string;
   /** File, element, byte or property in question. */
   readonly where: string;
-  /** What to do about it. */
+  /** Suggested correction. */
   readonly remedy: string;
   /** The lower-level error, if one caused this. */
   readonly cause?: unknown;
 }
 
-/** A `GaussianSplatError` as plain data: structured clone (workers) drops class and fields of errors. */
+/** A `GaussianSplatError` as plain data, because structured clone (workers) drops class and fields of errors. */
 export interface ErrorData extends Omit<ErrorDetails, 'cause'> {
   readonly code: ErrorCode;
 }
@@ -137,7 +144,7 @@ export class GaussianSplatError extends Error implements ErrorDetails {
 
   constructor(code: ErrorCode, details: ErrorDetails) {
     const { expected, found, where, remedy, cause } = details;
-    // Messages of browsers, which may be what was found, bring their own full stop.
+    // Messages of browsers, which may be the found value, end with their own full stop.
     super(`${where}: expected ${expected}, found ${found.replace(/\.$/, '')}. ${capitalise(remedy)}. [${code}]`, {
       cause,
     });

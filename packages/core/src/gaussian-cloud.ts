@@ -1,25 +1,26 @@
 import { GaussianSplatError } from './errors.js';
 import type { Vector3 } from './vector.js';
 
-/** Degree of the spherical harmonics of a cloud. Degree d has (d + 1)² coefficients for each colour channel. */
+/** Degree of the spherical harmonics of a cloud. Degree d has (d + 1)² coefficients for each color channel. */
 export type ShDegree = 0 | 1 | 2 | 3;
 
-/** Number of spherical-harmonics coefficients for each colour channel: (d + 1)². */
+/** Number of spherical-harmonics coefficients for each color channel: (d + 1)². */
 export function shCoefficientCount(degree: ShDegree): 1 | 4 | 9 | 16 {
   return ((degree + 1) * (degree + 1)) as 1 | 4 | 9 | 16;
 }
 
 /**
- * The screen-space low-pass filter that a scene was trained with: `classic` adds 0.3 px² to the variance of each splat, `antialiased` compensates its opacity for that, too (gsplat's and
- * INRIA's options of that name), and `mip` adds 0.1 px² and compensates (Mip-Splatting, Brush's mip mode).
+ * The screen-space low-pass filter of a scene's training: `classic` adds 0.3 px² to the variance of each splat,
+ * `antialiased` also compensates its opacity for that (the options of that name in gsplat and INRIA's code), and `mip`
+ * adds 0.1 px² and compensates (Mip-Splatting, Brush's mip mode).
  */
 export type SplatFilter = 'classic' | 'antialiased' | 'mip';
 
-/** A filter in numbers. */
+/** Parameters of a filter. */
 export interface FilterRule {
-  /** Whether opacities are compensated for what is added. */
+  /** Whether opacities are compensated for the added variance. */
   readonly antialiased: boolean;
-  /** Variance in px² that is added; undefined is the classic 0.3. */
+  /** Added variance in px²; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
 }
 
@@ -29,7 +30,7 @@ export const SPLAT_FILTERS: Readonly<Record<SplatFilter, FilterRule>> = {
   mip: { antialiased: true, filterVariance: 0.1 },
 };
 
-/** Splats `first` to `first + count` of a cloud: what a place of the scene, a node, looks like at one level of detail, 0 being the finest. */
+/** Splats `first` to `first + count` of a cloud: one level of detail of a node of the scene; level 0 is the finest. */
 export interface LevelRun {
   readonly first: number;
   readonly count: number;
@@ -37,32 +38,32 @@ export interface LevelRun {
   readonly level: number;
 }
 
-/** What a file says about itself beside its numbers. */
+/** Metadata of a file. */
 export interface CloudHints {
-  /** The direction of the cloud's frame that points up, of length 1. */
+  /** Unit vector that points up in the coordinates of the cloud. */
   readonly up?: Vector3 | undefined;
-  /** Whether the file names no frame, so that the direction of up was assumed from the marks of its writer. */
+  /** Whether the file declares no coordinate system, so that up was inferred from its writer. */
   readonly isUpAssumed?: boolean;
-  /** The tool that wrote the file, in its own words. */
+  /** The tool that wrote the file, as the file names it. */
   readonly generator?: string;
-  /** `pixel`: the scene was trained with splats ordered pixel by pixel, as StopThePop does. */
+  /** `pixel`: the scene was trained with per-pixel order, as in StopThePop. */
   readonly order?: 'pixel';
-  /** The file has triangles, too, which a cloud cannot hold. */
+  /** Whether the file also has triangles, which a cloud cannot hold. */
   readonly meshes?: boolean;
 }
 
 /**
- * Gaussians on the CPU, activated and ready to draw; every format is read into this one shape.
+ * Gaussians on the CPU, activated and ready to draw; every format is read into this structure.
  *
- * Frame: that of the trainers and of INRIA's PLY files, which is OpenCV's for an upright capture
- * (x right, y down, z forward). Readers of formats with another frame convert.
+ * Coordinates are those of the trainers and of INRIA's PLY files, which are OpenCV's for an upright capture (x right, y
+ * down, z forward). Readers of formats with other coordinates convert them.
  */
 export interface GaussianCloud {
   /** Number of Gaussians N. */
   readonly count: number;
-  /** World position, in float64, of the local point (0, 0, 0) that {@link positions} are relative to. */
+  /** World position, in float64, of the local point (0, 0, 0) of {@link positions}. */
   readonly origin: Vector3;
-  /** [N, 3] centres in world units, relative to {@link origin}. */
+  /** [N, 3] centers in world units, relative to {@link origin}. */
   readonly positions: Float32Array;
   /** [N, 3] standard deviations along the local axes in world units, linear (not log). */
   readonly scales: Float32Array;
@@ -71,40 +72,49 @@ export interface GaussianCloud {
   /** [N] opacities in 0..1, linear (not logit). */
   readonly opacities: Float32Array;
   /**
-   * [N, (d+1)², 3] spherical-harmonics coefficients, red, green and blue innermost. Colour = 0.5 + Σ c·Y(direction),
+   * [N, (d+1)², 3] spherical-harmonics coefficients, red, green and blue innermost. Color = 0.5 + Σ c·Y(direction),
    * sRGB-encoded; the first coefficient is the constant one ("DC").
    */
   readonly sh: Float32Array;
   readonly shDegree: ShDegree;
-  /** True if the scene was trained with opacity compensation for the screen-space dilation (Mip-Splatting style). */
+  /** Whether the scene was trained with opacity compensation for the screen-space dilation (Mip-Splatting style). */
   readonly antialiased: boolean;
   /**
-   * Variance in px² of the screen-space low-pass filter that the scene was trained with. Undefined: 0.3, which INRIA's and gsplat's trainers have, with compensation
-   * and without; Mip-Splatting and Brush's mip mode have 0.1.
+   * Variance in px² of the screen-space low-pass filter of training. Undefined: 0.3, as in INRIA's and gsplat's
+   * trainers, with and without compensation; Mip-Splatting and Brush's mip mode use 0.1.
    */
   readonly filterVariance?: number | undefined;
-  /** What the file says about itself. */
+  /** Metadata of the file. */
   readonly hints?: CloudHints | undefined;
-  /** Where a file has levels of detail of its own: all splats in runs, of which one of each node is to be drawn. Undefined: all splats are. */
+  /**
+   * Only for a file with its own levels of detail: all splats are in runs, and one run of each node is to be drawn.
+   * Undefined: all splats are drawn.
+   */
   readonly levelRuns?: readonly LevelRun[];
-  /** Number of splats of the source that were left out because a value was not usable; see {@link keepUsable}. */
+  /** Number of splats of the source that were dropped because of an unusable value; see {@link keepUsable}. */
   readonly droppedCount: number;
-  /** How many of them {@link keepUsable} left out for a scale below 0, for no rotation, for no extent, and for values that are not finite or too large. */
+  /**
+   * Counts of the splats that {@link keepUsable} dropped for a scale below 0, for a zero rotation, for no extent, and
+   * for values that are not finite or too large.
+   */
   readonly faults?: readonly number[] | undefined;
-  /** Sentences for readers about what of the file is not drawn, or may mean something else than what is drawn. */
+  /** Messages about parts of the file that are not drawn, or may be misinterpreted. */
   readonly warnings?: readonly string[] | undefined;
 }
 
 /**
- * Largest standard deviation, in world units, that a splat may have along its longest axis: squared screen sizes must
- * fit float32. Below the smallest a splat has no extent.
+ * Upper limit of the standard deviation along a splat's longest axis, in world units: squared screen sizes must fit
+ * float32. Below the lower limit a splat has no extent.
  */
 export const MAX_SCALE = 1e12;
-/** Largest coordinate of a splat that can be drawn, in world units: products of two are far from the end of float32, in which chunks are bounded. */
+/**
+ * Upper limit of the coordinates of a drawable splat, in world units: products of two are far from the limit of
+ * float32, in which bounds of chunks are computed.
+ */
 export const MAX_POSITION = 1e18;
 export const MIN_LONGEST_SCALE = 1e-12;
 
-/** Throws `argument/cloud` unless the arrays of a cloud have the lengths that `count` and `shDegree` ask for. */
+/** Throws `argument/cloud` unless the arrays of a cloud have the lengths that `count` and `shDegree` require. */
 export function validateCloud(cloud: GaussianCloud): void {
   const { count, shDegree } = cloud;
   const fail = (where: string, expected: string, found: string): never => {
@@ -133,15 +143,15 @@ export function validateCloud(cloud: GaussianCloud): void {
 }
 
 /**
- * Tells whether splat `i` can be drawn: all numbers finite, no coordinate beyond {@link MAX_POSITION}, a rotation that is not zero, the longest
- * standard deviation within {@link MIN_LONGEST_SCALE}..{@link MAX_SCALE} and none negative. Single axes may be 0: flat discs and needles
- * are fine. The shader `cull.wgsl` applies the same rule to buffers that no CPU has seen.
+ * Whether splat `i` can be drawn: all numbers finite, no coordinate beyond {@link MAX_POSITION}, a non-zero rotation,
+ * the longest standard deviation within {@link MIN_LONGEST_SCALE}..{@link MAX_SCALE} and none negative. Single axes may
+ * be 0, as in flat discs and needles. The shader `cull.wgsl` applies the same rule to buffers that the CPU never reads.
  */
 export function isUsable(cloud: GaussianCloud, i: number): boolean {
   const { positions, scales, rotations, opacities, sh, shDegree } = cloud;
   const shLength = 3 * shCoefficientCount(shDegree);
-  // A sum is finite only if every term is: infinities of both signs add up to NaN. sh is the longest array, so this is the inner loop of loading, and one
-  // sum alone would wait for each of its additions.
+  // A sum is finite only if every term is: infinities of both signs add up to NaN. sh is the longest array, so this is
+  // the inner loop of loading, and a single sum would wait for each of its additions.
   let red = 0;
   let green = 0;
   let blue = 0;
@@ -163,8 +173,8 @@ export function isUsable(cloud: GaussianCloud, i: number): boolean {
 }
 
 /**
- * Normalises rotations and leaves out the splats that {@link isUsable} refuses, counting them in `droppedCount`.
- * Works in place on the arrays of `cloud` (which must not be used afterwards) and keeps the order of the rest.
+ * Normalizes rotations and drops the splats that {@link isUsable} rejects, counting them in `droppedCount`. Works in
+ * place on the arrays of `cloud` (which must not be used afterwards) and keeps the order of the rest.
  */
 export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   const { count, positions, scales, rotations, opacities, sh, shDegree } = cloud;
@@ -207,7 +217,7 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   };
 }
 
-/** Why a splat cannot be drawn: which of {@link GaussianCloud.faults}. */
+/** Reason that a splat cannot be drawn, as an index of {@link GaussianCloud.faults}. */
 function faultOf({ scales, rotations }: GaussianCloud, i: number): number {
   const axes = scales.subarray(3 * i, 3 * i + 3);
   if (Math.min(...axes) < 0) return 0;
@@ -220,7 +230,7 @@ function normaliseQuaternion(rotations: Float32Array, at: number): void {
   for (let k = at; k < at + 4; k++) rotations[k] *= scale;
 }
 
-/** Squares of float32 numbers neither overflow nor vanish in float64. */
+/** Squares of float32 numbers neither overflow nor underflow in float64. */
 function squaredNorm(rotations: Float32Array, at: number): number {
   const w = rotations[at];
   const x = rotations[at + 1];

@@ -1,7 +1,7 @@
-/** Numbers of all 65,536 float16 bit patterns; made when first needed. */
+/** Values of all 65,536 float16 bit patterns; created on demand. */
 let table: Float32Array | undefined;
 
-/** The number that 16 bits of IEEE 754 binary16 stand for. */
+/** Value of the 16 bits of an IEEE 754 binary16. */
 export function halfToNumber(bits: number): number {
   table ??= Float32Array.from({ length: 65_536 }, (_, pattern) => decode(pattern));
   return table[bits];
@@ -18,7 +18,7 @@ function decode(bits: number): number {
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
-/** Bits of the float16 next to a number, ties to even; beyond the range, infinity. */
+/** Bits of the float16 nearest to a number, ties to even; infinity beyond the range. */
 export function numberToHalf(value: number): number {
   float[0] = value;
   const sign = (bits[0] >>> 16) & 0x8000;
@@ -29,6 +29,6 @@ export function numberToHalf(value: number): number {
   const scaled = magnitude / 2 ** (exponent - 10);
   const floor = Math.floor(scaled);
   const isUp = scaled - floor > 0.5 || (scaled - floor === 0.5 && floor % 2 === 1);
-  // A fraction that rounds up to 2048 carries into the exponent by itself.
+  // A fraction that rounds up to 2048 carries into the exponent.
   return sign + (exponent + 14) * 1024 + floor + (isUp ? 1 : 0);
 }

@@ -1,20 +1,20 @@
 import { loadModule } from './load-module.js';
 
-/** After a failure {@link Lazy.want} asks again no sooner, ms. */
+/** Minimum time between a failure and the next request of {@link Lazy.want}, ms. */
 const PAUSE_MS = 5_000;
 
-/** Code that few pages need, fetched on its first use. A failure is not remembered: the next use fetches it again. */
+/** Code that few pages need, loaded at its first use. A failure is not cached: the next use loads it again. */
 export class Lazy<T> {
-  /** Present once the code is there. */
+  /** Present once the code is loaded. */
   value: T | undefined;
   #loading: Promise<T> | undefined;
   #failedAt = -Infinity;
   readonly #load: () => Promise<T>;
 
   /**
-   * @param what the code is for, as in "the code that reads PLY"
-   * @param load imports it, and may make something of it
-   * @param onValue called once the value is there
+   * @param what Purpose of the code, as in "the code that reads PLY".
+   * @param load Imports it, and may create a value from it.
+   * @param onValue Called once the value is present.
    */
   constructor(what: string, load: () => Promise<T>, onValue: () => void = ignore) {
     this.#load = async () => {
@@ -24,7 +24,7 @@ export class Lazy<T> {
     };
   }
 
-  /** @throws GaussianSplatError `network/unreachable` if it cannot be fetched. */
+  /** @throws GaussianSplatError `network/unreachable` if it cannot be loaded. */
   get(): Promise<T> {
     return (this.#loading ??= this.#load().catch((error: unknown) => {
       this.#loading = undefined;
@@ -33,14 +33,17 @@ export class Lazy<T> {
     }));
   }
 
-  /** The value if it is there; otherwise starts fetching it. For callers that ask often, such as each frame: after a failure requests pause for seconds. */
+  /**
+   * Returns the value if it is loaded; otherwise starts loading it. For frequent callers, such as each frame: after a
+   * failure requests pause for seconds.
+   */
   want(onError: (error: Error) => void = ignore): T | undefined {
     if (this.value === undefined && !this.#loading && performance.now() - this.#failedAt >= PAUSE_MS)
       this.get().catch(onError);
     return this.value;
   }
 
-  /** Fulfils, and never rejects, once nothing is being fetched. */
+  /** Resolves, and never rejects, once nothing is being loaded. */
   get settled(): Promise<unknown> {
     return this.#loading?.catch(ignore) ?? Promise.resolve();
   }

@@ -1,4 +1,4 @@
-/** 3 x 3 matrices, row by row, in float64. */
+/** 3 x 3 matrices, row-major, in float64. */
 export type Matrix3 = readonly number[];
 
 export function determinant(m: Matrix3): number {
@@ -24,7 +24,7 @@ function inverseTransposed(m: Matrix3): number[] {
   ].map((cofactor) => cofactor / d);
 }
 
-/** The rotation, or rotation with a reflection, that is nearest to a matrix: its orthogonal polar factor. */
+/** The rotation or reflection nearest to a matrix: its orthogonal polar factor. */
 export function orthogonalFactor(m: Matrix3): number[] {
   const size = Math.cbrt(Math.abs(determinant(m)));
   let q = m.map((value) => value / size);
@@ -50,7 +50,7 @@ export function matrixOfQuaternion(w: number, x: number, y: number, z: number): 
 /** Unit quaternion (w, x, y, z) of a rotation matrix. */
 export function quaternionOfMatrix(m: Matrix3): [number, number, number, number] {
   const trace = m[0] + m[4] + m[8];
-  // The largest of the four is taken from its square, the rest follow from it without loss.
+  // The largest of the four comes from its square; the others follow from it without loss of precision.
   const squares = [1 + trace, 1 + 2 * m[0] - trace, 1 + 2 * m[4] - trace, 1 + 2 * m[8] - trace];
   const largest = squares.indexOf(Math.max(...squares));
   const [yz, zx, xy] = [m[7] - m[5], m[2] - m[6], m[3] - m[1]];
@@ -93,7 +93,7 @@ export function symmetricEigen(m: Matrix3): { values: [number, number, number]; 
   return { values: [a[0], a[4], a[8]], vectors };
 }
 
-/** Turns two entries, as a pair, by an angle whose cosine and sine are given. */
+/** Rotates two entries, as a pair, by an angle with the given cosine and sine. */
 function turn(entries: number[], p: number, q: number, c: number, s: number): void {
   const [first, second] = [entries[p], entries[q]];
   entries[p] = c * first - s * second;

@@ -1,11 +1,11 @@
 import { GaussianSplatError } from './errors.js';
 
 /**
- * Address of a file that another file names. One on the same server without a query of its own gets that of the other: where addresses are signed, it is what lets one in. No other
- * server gets to know it.
+ * Address of a file that another file names. On the same server, a file without its own query gets that of the other,
+ * because signed addresses need it. Other servers never receive the query.
  *
- * @param path relative to the other file, or absolute
- * @param parent absolute address of the other file
+ * @param path Relative to the other file, or absolute.
+ * @param parent Absolute address of the other file.
  */
 export function partUrl(path: string, parent: string | URL): URL {
   const url = new URL(path, parent);
@@ -14,7 +14,7 @@ export function partUrl(path: string, parent: string | URL): URL {
   return url;
 }
 
-/** A file to be fetched, and whether cookies go along. */
+/** A file to fetch, and its cookies policy. */
 export interface PartRequest {
   /** Absolute URL. */
   readonly url: string;
@@ -22,13 +22,15 @@ export interface PartRequest {
 }
 
 /**
- * How a file is asked for that a manifest names: on the manifest's own server as the manifest was, on those that the page allows without cookies, and nowhere else: who writes a
- * manifest must not choose the servers that visitors' browsers ask.
+ * Request for a file that a manifest names: on the manifest's own server with its credentials, on servers that the page
+ * allows without cookies, and on no others, because the author of a manifest must not choose the servers that visitors'
+ * browsers contact.
  *
- * @param path relative to the manifest, or absolute
- * @param manifest as it was asked for itself
- * @param origins of other servers that are allowed, such as `https://cdn.example`
- * @throws GaussianSplatError `decode/unsupported` for other servers, and for relative paths in a manifest that has no place (`blob:`, `data:`)
+ * @param path Relative to the manifest, or absolute.
+ * @param manifest Its own request.
+ * @param origins Other allowed servers, such as `https://cdn.example`.
+ * @throws GaussianSplatError `decode/unsupported` for other servers, and for relative paths in a manifest without a
+ * base address (`blob:`, `data:`).
  */
 export function partRequest(path: string, manifest: PartRequest, origins: readonly string[] = []): PartRequest {
   const { url: parent, credentials } = manifest;
@@ -43,5 +45,5 @@ export function partRequest(path: string, manifest: PartRequest, origins: readon
   });
 }
 
-/** Origins; files on a disk and data, which have none, are on servers of their own. */
+/** Origins; local files and data URLs, which have none, count as separate servers. */
 const serverOf = ({ origin, protocol, host }: URL): string => (origin === 'null' ? protocol + host : origin);

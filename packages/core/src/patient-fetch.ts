@@ -1,15 +1,18 @@
-/** Milliseconds after which a server that does not answer is given up, and a connection on which less than 1 KiB has arrived counts as broken. */
+/**
+ * Milliseconds without a response after which a server is abandoned, and a connection with less than 1 KiB counts as
+ * broken.
+ */
 export const PATIENCE_MS = 30_000;
 const PATIENCE_BYTES = 1024;
 
-/** A server, or a connection, from which too little has arrived for {@link PATIENCE_MS}. */
+/** A server or connection that sent too little data within {@link PATIENCE_MS}. */
 export class SilenceError extends Error {
   constructor() {
     super(`nothing came for ${PATIENCE_MS / 1000} s`);
   }
 }
 
-/** As `fetch`. Rejects with a {@link SilenceError}, besides, if no headers arrive in time. */
+/** Same as `fetch`, but also rejects with a {@link SilenceError} if no headers arrive in time. */
 export async function fetchPatiently(url: string | URL, { signal, ...init }: RequestInit = {}): Promise<Response> {
   const silence = new AbortController();
   const timer = setTimeout(() => silence.abort(new SilenceError()), PATIENCE_MS);
@@ -25,8 +28,8 @@ export async function fetchPatiently(url: string | URL, { signal, ...init }: Req
 }
 
 /**
- * The pieces of a body. When the loop over them ends early, so does the connection.
- * @param failed makes the error that is thrown for what the connection, or the silence on it, gave as its cause
+ * Iterates over the chunks of a body. Ending the loop early closes the connection.
+ * @param failed Creates the error to throw from the error of the connection or of its silence.
  */
 export async function* chunksOf(
   { body }: Response,
@@ -51,7 +54,7 @@ export async function* chunksOf(
   }
 }
 
-/** A whole body. Rejects as {@link chunksOf} throws. @param maxBytes of a longer body it rejects with a RangeError */
+/** Reads a whole body. Rejects as {@link chunksOf} throws. @param maxBytes A longer body rejects with a RangeError. */
 export async function bytesOf(
   response: Response,
   failed?: (cause: unknown) => unknown,

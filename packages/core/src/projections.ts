@@ -1,27 +1,32 @@
-/** Cameras from the matrices of hosts: a module of its own, since few pages have a host. */
+/** Cameras from the matrices of hosts: a separate module, because few pages have a host. */
 import { describeCamera as describe, failCamera as fail, validateCamera, type Camera } from './camera.js';
 import { cross, dot, type Vector3 } from './vector.js';
 
-/** How a host's projection writes depth. */
+/** Options of a host's projection. */
 export interface ProjectionOptions {
   /** Image size in pixels. */
   readonly width: number;
   readonly height: number;
-  /** Range of depth behind the division by w: `0..1` as WebGPU has it, or `-1..1` as OpenGL does. Default: `0..1`. */
+  /** Range of depth after the division by w: `0..1` as in WebGPU, or `-1..1` as in OpenGL. Default: `0..1`. */
   readonly clipDepth?: '0..1' | '-1..1';
 }
 
-/** Of the distance between the planes: where the near plane of parallel rays is put that lies at the eye or behind it. */
+/**
+ * Near plane as a fraction of the distance between the planes, for parallel rays whose near plane is at the eye or
+ * behind it.
+ */
 const LEAST_NEAR = 1e-3;
 
 /**
- * A camera from the two matrices of a host such as three.js, glMatrix or WebXR: x right, y up, z backward, clip space as GPUs have it.
+ * Returns a camera for the two matrices of a host such as three.js, glMatrix or WebXR: x right, y up, z backward, clip
+ * space of GPUs.
  *
  * ```ts
  * const camera = cameraFromProjection(camera3.matrixWorldInverse.elements, camera3.projectionMatrix.elements, { width, height });
  * ```
- * @param view world to camera, 16 numbers, column-major
- * @param projection perspective or orthographic, 16 numbers, column-major; off-centre and reversed ones, and those without a far plane, too
+ * @param view World to camera, 16 numbers, column-major.
+ * @param projection Perspective or orthographic, 16 numbers, column-major; may be off-center or reversed, and may have
+ * no far plane.
  * @throws GaussianSplatError `argument/camera` for a projection with skew, or one that is neither.
  */
 export function cameraFromProjection(
@@ -43,7 +48,7 @@ export function cameraFromProjection(
   const planes = (clipDepth === '0..1' ? [0, 1] : [-1, 1]).map((depth) =>
     orthographic ? (p[14] - depth) / p[10] : p[14] / (p[10] + depth),
   );
-  // A projection without a far plane divides by nothing, or next to it.
+  // An infinite far plane divides by zero, or nearly.
   const distances = planes.map((plane) => (Number.isFinite(plane) && (orthographic || plane > 0) ? plane : Infinity));
   const [nearest, far] = [Math.min(...distances), Math.max(...distances)];
   const back = orthographic && nearest <= 0 ? LEAST_NEAR * (far - nearest) - nearest : 0;
@@ -68,9 +73,9 @@ export function cameraFromProjection(
 }
 
 /**
- * A camera from the one matrix that maps give: from the coordinates of a scene to clip space, perspective.
- * @param matrix 16 numbers, column-major; it may scale
- * @throws GaussianSplatError `argument/camera` for a matrix with skew, a mirrored one, and one that is no perspective.
+ * Returns a camera for the single matrix that maps provide: from the coordinates of a scene to clip space, perspective.
+ * @param matrix 16 numbers, column-major; it may scale.
+ * @throws GaussianSplatError `argument/camera` for a matrix with skew, a mirrored one, or one without perspective.
  */
 export function cameraFromClip(
   matrix: ArrayLike<number>,
@@ -81,7 +86,7 @@ export function cameraFromClip(
   const [x, y, z, w] = [0, 1, 2, 3].map((row): Vector3 => [matrix[row], matrix[4 + row], matrix[8 + row]]);
   const squared = dot(w, w);
   if (squared === 0) fail('matrix', 'a perspective', describe(Array.from(matrix)));
-  // Rows of clip space are those of the camera: each is a multiple of one, and of the depth's.
+  // Each row of clip space is a combination of a camera row and the depth row.
   const axis = (row: Vector3, number: number): { focal: number; shift: number; row: number[] } => {
     const shift = dot(row, w) / squared;
     const own = [0, 1, 2].map((k) => row[k] - shift * w[k]) as unknown as Vector3;
@@ -112,5 +117,5 @@ export function cameraFromClip(
   return camera;
 }
 
-/** Cosine of the angle between the axes of a picture up to which that is none: matrices of maps are rounded. */
+/** Tolerance of the cosine between the image axes, because the matrices of maps are rounded. */
 const SKEW = 1e-3;

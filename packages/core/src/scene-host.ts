@@ -1,14 +1,14 @@
 import type { GaussianLayout } from './contract/index.js';
 
-/** Gaussians of a generator that stand in a scene of a renderer. */
+/** Gaussians of a generator in a scene of another renderer. */
 export interface HostedGaussians<Sink = unknown> {
-  /** Takes what each run writes: a `GaussianSink` of `@gaussian-splat/generator`. */
+  /** Accepts the output of each run: a `GaussianSink` of `@gaussian-splat/generator`. */
   readonly gaussians: Sink;
-  /** Takes them out of the scene and frees their memory. */
+  /** Removes them from the scene and frees their memory. */
   remove(): void;
 }
 
-/** A renderer whose scenes take the Gaussians of generators. */
+/** A renderer whose scenes accept the Gaussians of generators. */
 export interface SceneHost<Scene = unknown, Device = never, Sink = unknown> {
   /** Whether it draws this scene. */
   accepts(scene: unknown): scene is Scene;
@@ -18,7 +18,7 @@ export interface SceneHost<Scene = unknown, Device = never, Sink = unknown> {
 
 const hosts: SceneHost[] = [];
 
-/** Makes the scenes of a renderer known to `addGaussianModelToScene`. A host that is known already stays as it is. */
+/** Registers the scenes of a renderer for `addGaussianModelToScene`. Repeated registration has no effect. */
 export function registerSceneHost(host: SceneHost): void {
   if (!hosts.includes(host)) hosts.push(host);
 }

@@ -1,4 +1,4 @@
-/** Bytes of what was read that are kept, by default. */
+/** Default limit of cached results in bytes. */
 const KEPT_BYTES = 128e6;
 
 interface Reading<T> {
@@ -6,38 +6,38 @@ interface Reading<T> {
   readonly controller: AbortController;
   readonly owner: unknown;
   readers: number;
-  /** Bytes, once it is there. */
+  /** Size in bytes, once it is loaded. */
   bytes?: number;
 }
 
 /**
- * What several callers need at once, or one after the other: it is read for the first of them, for as long as one waits, and what was used last is kept, up to a number of
- * bytes.
+ * Shares reads between callers, concurrent or subsequent: a read continues while any caller waits, and recently used
+ * results are cached up to a number of bytes.
  */
 export class SharedReads<T> {
   readonly #sizeOf: (result: T) => number;
   readonly #keptBytes: number;
-  /** The one used last is the last. */
+  /** The most recently used is last. */
   readonly #readings = new Map<string, Reading<T>>();
 
   /**
-   * @param sizeOf bytes that a result takes
-   * @param keptBytes results that are kept; the last one is, however large
+   * @param sizeOf Size of a result in bytes.
+   * @param keptBytes Limit of the cache; the last result is always kept.
    */
   constructor(sizeOf: (result: T) => number, keptBytes = KEPT_BYTES) {
     this.#sizeOf = sizeOf;
     this.#keptBytes = keptBytes;
   }
 
-  /** Whether a result is kept. */
+  /** Whether a result is cached. */
   has(key: string): boolean {
     return this.#readings.get(key)?.bytes !== undefined;
   }
 
   /**
-   * Rejects as `read` does, or with the reason of `signal` as soon as that is aborted.
-   * @param read is aborted when no caller waits for it any more
-   * @param owner on whose account it is read: results are shared by all, readings under way by those of one account
+   * Rejects as `read` does, or immediately with the reason of `signal` when it is aborted.
+   * @param read Is aborted when no caller waits for it.
+   * @param owner Account of the read: results are shared by all callers, pending reads by those of one account.
    */
   async read(
     key: string,

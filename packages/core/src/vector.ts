@@ -1,4 +1,4 @@
-/** Small float64 linear algebra: what cameras and bounds need, no more. Matrices are row-major. */
+/** Minimal float64 linear algebra for cameras and bounds. Matrices are row-major. */
 
 export type Vector3 = readonly [x: number, y: number, z: number];
 
@@ -43,7 +43,7 @@ export function inverse(m: Matrix4): Float64Array {
     [m[4], m[5], m[6]],
     [m[8], m[9], m[10]],
   ];
-  // By Cramer's rule: sheared and scaled matrices have an inverse too.
+  // Cramer's rule also inverts sheared and scaled matrices.
   const determinant = dot(rows[0], cross(rows[1], rows[2]));
   const column = (a: Vector3, b: Vector3): Vector3 => scale(cross(a, b), 1 / determinant);
   const [c0, c1, c2] = [column(rows[1], rows[2]), column(rows[2], rows[0]), column(rows[0], rows[1])];

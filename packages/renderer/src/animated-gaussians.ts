@@ -14,16 +14,16 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 const { CULL_GROUP } = constants;
 const PIECES = ['bases', 'sh', 'codes', 'curves'] as const;
 
-/** What the parts of any group of a clip need at most, in their order. */
+/** Largest sizes of the parts over all groups of a clip, in their order. */
 export interface AnimatedRoom {
   readonly parts: readonly { readonly rows: number; readonly planes: number; readonly frames: number }[];
   readonly shDegree: ShDegree;
   readonly antialiased: boolean;
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
-  /** By how much splats of the first part are enlarged while others are missing. */
+  /** Factor that enlarges the splats of the first part while other parts are missing. */
   readonly grow: number;
-  /** Bytes of GPU memory that it may take; default no limit but the device's. */
+  /** Upper limit of its GPU memory in bytes; default: no limit but the device's. */
   readonly memoryBudget?: number | undefined;
 }
 
@@ -31,21 +31,22 @@ export interface AnimatedRoom {
 interface SlotPart {
   readonly buffers: Readonly<Record<(typeof PIECES)[number], GPUBuffer>>;
   readonly uniform: GPUBuffer;
-  /** `Animate` of shaders/animate.wgsl, as the uniform has it. */
+  /** `Animate` of shaders/animate.wgsl, in the layout of the uniform. */
   readonly values: Uint32Array<ArrayBuffer>;
   readonly bindings: GPUBindGroup;
   readonly rowRoom: number;
-  /** What is being written, or has been, and how many bytes of it. */
+  /** The part that is being or has been uploaded, and the number of its uploaded bytes. */
   content: PackedAnimation | undefined;
   written: number;
 }
 
-/** Slots: the group that is shown, and the next one. */
+/** Number of slots: one for the group that is shown, one for the next. */
 export const ANIMATION_SLOTS = 2;
 const FIELDS = layouts.Animate.fields;
 
 /**
- * Gaussians of a clip: groups of frames are uploaded once, and each frame of them is made on the GPU. All buffers are made at the beginning, so that nothing is allocated while it plays.
+ * Gaussians of a clip: groups of frames are uploaded once, and each frame is evaluated on the GPU. All buffers are
+ * created at the start, so that playback allocates nothing.
  */
 export class AnimatedGaussians implements GaussianScene {
   readonly count: number;
@@ -122,27 +123,27 @@ export class AnimatedGaussians implements GaussianScene {
     return this.#memory.byteLength;
   }
 
-  /** Splats of the group that is shown. */
+  /** Splats of the current group. */
   get frameCount(): number {
     return this.#frameCount;
   }
 
-  /** Forgets what a slot has. */
+  /** Discards the content of a slot. */
   clear(slot: number): void {
     for (const part of this.#slots[slot]) part.content = undefined;
   }
 
-  /** True once all of a part is in a slot. */
+  /** Whether a slot contains all of a part. */
   isWritten(slot: number, part: number): boolean {
     const { content, written } = this.#slots[slot][part];
     return content !== undefined && written === sizeOf(content);
   }
 
   /**
-   * Uploads a part into a slot, or the next bytes of it.
-   * @param most bytes to upload now, at most
-   * @returns bytes that were uploaded
-   * @throws GaussianSplatError `argument/value` for a part that has no room
+   * Uploads a part into a slot, or its next bytes.
+   * @param most Upper limit of the bytes to upload now.
+   * @returns Number of bytes that were uploaded.
+   * @throws GaussianSplatError `argument/value` for a part that does not fit
    */
   write(slot: number, part: number, content: PackedAnimation, most = Infinity): number {
     const to = this.#slots[slot][part];
@@ -169,9 +170,9 @@ export class AnimatedGaussians implements GaussianScene {
   }
 
   /**
-   * Makes a frame of the group in a slot, of the parts that are there: what is submitted from now on shows it.
-   * @param frame of the group
-   * @param isWhole false while parts of the group are missing: what is there is enlarged
+   * Evaluates a frame of the group in a slot, from the parts uploaded until now; subsequent submissions show it.
+   * @param frame Index within the group.
+   * @param isWhole False while parts of the group are missing: the present ones are enlarged.
    */
   show(slot: number, frame: number, isWhole: boolean): void {
     const parts = this.#slots[slot];
@@ -224,7 +225,7 @@ export class AnimatedGaussians implements GaussianScene {
 const grow = new Float32Array(1);
 const growBits = new Uint32Array(grow.buffer);
 
-/** In place: a frame allocates nothing. */
+/** Works in place, so that a frame allocates nothing. */
 function setValues(values: Uint32Array, content: PackedAnimation | undefined, frame: number, factor: number): void {
   grow[0] = factor;
   values[FIELDS.rows.offset / 4] = content?.rows ?? 0;

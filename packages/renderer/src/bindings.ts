@@ -12,7 +12,7 @@ export interface Stages {
   readonly plan: ReturnType<typeof planStage>;
   readonly compact: ReturnType<typeof compactStage>;
   readonly sort: SortStage;
-  /** Those that read geometry of a kind. */
+  /** Stages that read a kind of geometry. */
   readonly reading: (kind?: GeometryReading) => ReadingStages;
 }
 
@@ -37,10 +37,10 @@ export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threa
   };
 }
 
-/** Bind groups of one page. */
+/** Bind groups of one block. */
 interface PageBindings {
   readonly splatCount: number;
-  /** Of a page of a streamed scene. */
+  /** Only for a block of a streamed scene. */
   readonly requests?: { readonly of: PageRequests; readonly note: GPUBindGroup };
   readonly reading: ReadingStages;
   readonly cullChunks: GPUBindGroup;
@@ -49,25 +49,25 @@ interface PageBindings {
   readonly project: GPUBindGroup;
 }
 
-/** What keeps a frame within a budget of splats, bound to the chunks of each page and to what they sum up to. */
+/** The stages that keep a frame within a splat budget, bound to the chunks of each block and to their sums. */
 interface BudgetBindings {
   readonly stages: DetailBudget;
   readonly count: readonly GPUBindGroup[];
   readonly allow: GPUBindGroup;
 }
 
-/** What {@link FrameBindings} binds the stages to. */
+/** Resources for {@link FrameBindings}. */
 export interface FrameBuffers {
   readonly table: PageTable;
   readonly scratch: Scratch;
 }
 
-/** Everything that the stages before the rasterizer are bound to, for one page table and one capacity. */
+/** Bind groups of all stages before the rasterizer, for one block table and one capacity. */
 export class FrameBindings {
   readonly pages: readonly PageBindings[];
-  /** With levels of detail. */
+  /** Only with levels of detail. */
   readonly budget: BudgetBindings | undefined;
-  /** Of the survivors in the file's order. */
+  /** Plans the survivors in the order of the file. */
   readonly plan: GPUBindGroup;
   readonly #sorts = new Map<number, ReturnType<SortStage['bind']>>();
   readonly table: PageTable;
@@ -89,7 +89,7 @@ export class FrameBindings {
     });
   }
 
-  /** What sorting by keys of so many bits needs. */
+  /** Bindings for sorting by keys of this many bits. */
   sort(keyBits: number): ReturnType<SortStage['bind']> {
     const known = this.#sorts.get(keyBits);
     if (known) return known;
@@ -126,7 +126,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
     const reading = stages.reading(table.readingOf(i));
     const modifiers = table.modifiersOf(i);
     const requests = table.requestsOf(i);
-    // Something must be bound where there are no levels of detail; it is not looked at.
+    // The binding must be filled even without levels of detail; it is then not read.
     const details = page.details ?? page.chunks;
     const chunk = { view, visible_bits: visibleBits };
     return {

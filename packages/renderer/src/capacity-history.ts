@@ -1,33 +1,39 @@
-/** What pictures have needed: for the rooms of those to come. */
+/** Capacity that frames have needed, as an estimate for the next ones. */
 
-/** For how much the buffers between the stages have room. */
+/** Capacity of the buffers between the stages. */
 export interface Capacity {
-  /** Splats that are visible at once. */
+  /** Splats visible in one frame. */
   readonly visible: number;
-  /** Pairs of splat and bin of the tiles. */
+  /** Pairs of splat and bin for the tiles. */
   readonly pairs: number;
 }
 
-/** Looks at buffers with room to spare before they shrink. */
+/** Samples with excess capacity before the buffers shrink. */
 const PATIENCE = 4;
-/** So many times as many where they had to grow again: views that come and go, such as an orbit's, soon keep the room that the largest needs. */
+/**
+ * Factor of that number each time the buffers had to grow again: views that alternate, such as those of an orbit, soon
+ * keep the largest capacity.
+ */
 const PATIENCE_GROWTH = 4;
-/** Two looks within such a time, ms, are at about the same view. */
+/** Two samples within this time, ms, are taken to show about the same view. */
 const SAME_VIEW_MS = 1_000;
-/** With the pixels of a picture to such powers its need grows, where it was not seen: of levels of detail more splats, and pairs (0.1 from afar, 0.6 close up). */
+/**
+ * A frame's need grows with its pixels to these powers, if no measurement is available: LOD scenes show more splats,
+ * and pairs grow (0.1 from far away, 0.6 close up).
+ */
 const EXPONENTS: Capacity = { visible: 0.25, pairs: 0.5 };
-/** By the settings of motion alone, more than the share of pixels says. */
+/** Upper limit of the factor that the settings of motion alone cause, beyond the ratio of pixels. */
 const MOST_OF_MOTION = 2;
 
 const NOTHING: Capacity = { visible: 0, pairs: 0 };
 
-/** Which picture a look was at. */
+/** The frame of a sample. */
 export interface SampledFrame {
   /** Its pixels. */
   readonly pixels: number;
-  /** Those of the picture at rest. */
+  /** Pixels of the frame at rest. */
   readonly wholePixels: number;
-  /** It was drawn as at rest. */
+  /** Whether it was drawn with the settings at rest. */
   readonly isWhole: boolean;
 }
 
@@ -36,13 +42,19 @@ interface CountSample extends SampledFrame {
   readonly at: number;
 }
 
-/** How often the room of a picture in motion the picture at rest needs, and of how many times its pixels that was seen. */
+/**
+ * Ratios between the frame at rest and the frame in motion: of their needs, and of their pixels when these were
+ * measured.
+ */
 interface Ratio {
   readonly pixels: number;
   readonly need: Capacity;
 }
 
-/** What the monitors of a scene learn: how long room to spare is kept, and what the picture at rest needs while those in motion show less. */
+/**
+ * History of a scene's capacity: how long excess capacity is kept, and the need of the frame at rest while only frames
+ * in motion are measured.
+ */
 export class CapacityHistory {
   #looks = PATIENCE;
   #hasShrunk = false;
@@ -50,23 +62,23 @@ export class CapacityHistory {
   #last: CountSample | undefined;
   #ratio: Ratio = { pixels: 1, need: { visible: 1, pairs: 1 } };
 
-  /** Looks at the buffers before they shrink. */
+  /** Samples before the buffers shrink. */
   get looks(): number {
     return this.#looks;
   }
 
-  /** Room was given up. */
+  /** Records that the buffers shrank. */
   shrink(): void {
     this.#hasShrunk = true;
   }
 
-  /** There had to be more room. */
+  /** Records that the buffers had to grow. */
   grow(): void {
     if (this.#hasShrunk) this.#looks *= PATIENCE_GROWTH;
     this.#hasShrunk = false;
   }
 
-  /** Takes note of a look. */
+  /** Records a sample. */
   note(sample: CountSample): void {
     const last = this.#last;
     this.#last = sample;
@@ -81,17 +93,17 @@ export class CapacityHistory {
     };
   }
 
-  /** What the last frame that was looked at needs when it is whole; undefined where none was looked at. */
+  /** Estimated need of the last sampled view at rest; undefined before the first sample. */
   get lastNeed(): Capacity | undefined {
     return this.#last && this.wholeNeedBy(this.#last);
   }
 
-  /** What the last whole picture needed, if that had so many pixels. */
+  /** Need of the last frame at rest, if it had this many pixels. */
   wholeNeed(pixels: number): Capacity {
     return pixels === this.#whole.pixels ? this.#whole.need : NOTHING;
   }
 
-  /** What the whole picture of the same view would need: so many times as much as when pictures last changed from one kind to the other. */
+  /** Estimated need of the same view at rest: scaled by the ratio measured at the last change between motion and rest. */
   wholeNeedBy({ pixels, wholePixels, isWhole, used }: Omit<CountSample, 'at'>): Capacity {
     if (isWhole) return used;
     const { pixels: seen, need } = this.#ratio;

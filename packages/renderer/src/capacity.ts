@@ -4,42 +4,45 @@ import { copyCounts } from './copy-counts.js';
 import { constants } from './generated/shaders.js';
 import type { Scratch } from './scratch.js';
 
-/** Between which bounds the room stays; the lower one may change, and is asked for at every look. */
+/** Bounds of the capacity; the lower one may change, so it is read at every sample. */
 export interface CapacityBounds {
   readonly least: () => Capacity;
   readonly most: Capacity;
 }
 
-/** Scenes up to this size get room for all their splats at once: 64 MB. */
+/** Scenes up to this size get capacity for all their splats at once: 64 MB. */
 const SMALL_SCENE = 1_300_000;
 const LEAST_PAIRS = 1 << 16;
-/** What buffers that are nearly empty may shrink to. */
+/** Minimum capacity of nearly empty buffers. */
 export const LEAST_CAPACITY: Capacity = { visible: 1, pairs: LEAST_PAIRS };
-/** Room for pairs that small scenes get without asking, so that a first frame from near by has it: 32 MB. */
+/** Initial capacity of small scenes in pairs, so that a close first frame fits: 32 MB. */
 const GENEROUS_PAIRS = 1 << 21;
-/** More room than was needed. */
+/** Factor of the capacity over the need. */
 const HEADROOM = 1.25;
-/** Share of the room that must be in use before there is more, or less. */
+/** Usage of the capacity above which it grows, and below which it shrinks. */
 const FULL = 0.92;
 const SLACK = 0.7;
-/** Bytes that giving up room must free. */
+/** Minimum of bytes that shrinking must free. */
 const LEAST_SAVING = 32 << 20;
 const BYTES_PER_VISIBLE = 40;
 const BYTES_PER_PAIR = 16;
-/** Frames between two looks once the first frames have been looked at. */
+/** Frames between two samples after the first frames. */
 const INTERVAL = 16;
-/** After so long without a look, ms, a frame is looked at whatever its number: it may be the only one of its view. */
+/** After this time without a sample, ms, the next frame is sampled: it may be the only one of its view. */
 const LONGEST_PAUSE_MS = 250;
 
 /** Pairs for each visible splat of a large scene. */
 const PAIRS_PER_SPLAT = 1.5;
-/** Pairs for each splat of the budget, where a scene with levels of detail keeps to one: a fifth of them is never visible, and those that use it up are small. 0.93 were needed of 10 and of 16 million. */
+/**
+ * Pairs for each splat of the budget in LOD scenes with one: a fifth of its splats is never visible, and a frame that
+ * uses the whole budget has small ones. Scenes of 10 and of 16 million needed 0.93.
+ */
 const PAIRS_PER_BUDGETED = 1.1;
 
-/** Visible splats, those without room, the same of pairs, and how often the frame is covered. */
+/** Visible splats, splats beyond the capacity, the same two for pairs, and the coverage. */
 const COUNT_BYTES = 20;
 
-/** Room to begin with. */
+/** Capacity before the first frame. */
 export function initialCapacity(splats: number, most: Capacity, isBudgeted = false): Capacity {
   const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
   const usual = Math.ceil((isBudgeted ? PAIRS_PER_BUDGETED : PAIRS_PER_SPLAT) * visible);
@@ -47,13 +50,16 @@ export function initialCapacity(splats: number, most: Capacity, isBudgeted = fal
   return { visible, pairs: Math.min(most.pairs, pairs) };
 }
 
-/** What a frame had. */
+/** Counts of one frame. */
 export interface FrameCounts extends Capacity {
   /** `gathered[COVERED]` */
   readonly covered: number;
 }
 
-/** Buffers that counts are read from: one for the monitor at hand and one for the next, so that none is made when scenes come and go. */
+/**
+ * Read-back buffers for the counts: one for the current monitor and one for the next, so that none is created when
+ * scenes change.
+ */
 export class CountBuffers {
   readonly #device: GPUDevice;
   readonly #free: GPUBuffer[];
@@ -85,8 +91,8 @@ export class CountBuffers {
 }
 
 /**
- * Watches how full the buffers are and says when they should be larger or smaller. Counts come back from the GPU a frame or more
- * later, and nothing waits for them; where there is room for everything that can happen, nothing is read at all.
+ * Monitors how full the buffers are and requests a larger or smaller capacity. Counts arrive from the GPU a frame or
+ * more later, and nothing waits for them; if the capacity covers every possible frame, nothing is read.
  */
 export class CapacityMonitor {
   readonly #buffers: CountBuffers;
@@ -96,7 +102,7 @@ export class CapacityMonitor {
   readonly #memory: CapacityHistory;
   #capacity: Capacity;
   #frame = 0;
-  /** The last picture that was drawn, the last that was looked at, and when that was. */
+  /** The last drawn frame, the last sampled one, and the time of that sample. */
   #drawn: SampledFrame = { pixels: 0, wholePixels: 0, isWhole: true };
   #picture = this.#drawn;
   #sampledAt = -Infinity;
@@ -106,9 +112,9 @@ export class CapacityMonitor {
   #recent: Capacity = { visible: 0, pairs: 0 };
 
   /**
-   * @param buffers what its counts are read from
-   * @param memory what monitors before this one have learnt about the scene
-   * @param onResize called with the room that the next frame should have
+   * @param buffers Read-back buffers of the counts.
+   * @param memory History that earlier monitors of the scene have recorded.
+   * @param onWish Called with the capacity that the next frame should have.
    */
   constructor(
     buffers: CountBuffers,
@@ -127,9 +133,11 @@ export class CapacityMonitor {
 
   /**
    * Counts a frame.
-   * @param isOpen whether its counts matter however much room for splats there is: its rasterizer makes pairs of splat and bin, or its overdraw is limited
-   * @param picture which it is: one of another size needs another room, and at rest no other follows
-   * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
+   * @param isOpen Whether its counts matter even if all splats fit: its rasterizer makes pairs of splat and bin, or its
+   * overdraw is limited.
+   * @param picture The frame: another size needs another capacity, and no frame follows one at rest.
+   * @returns Whether to sample this frame; then {@link record} must be called before the submit and {@link read} after
+   * it.
    */
   isDue(isOpen: boolean, picture: SampledFrame): boolean {
     const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !isOpen;
@@ -145,7 +153,7 @@ export class CapacityMonitor {
     return true;
   }
 
-  /** Records the copy of the counts. */
+  /** Records the copy of the counts to a read-back buffer. */
   record(
     encoder: GPUCommandEncoder,
     { plan, gathered }: Pick<Scratch, 'plan' | 'gathered'>,
@@ -157,8 +165,8 @@ export class CapacityMonitor {
   }
 
   /**
-   * Looks at the counts once they are there.
-   * @returns what the frame had: undefined where the device is lost, or this monitor was destroyed meanwhile
+   * Reads the counts when they arrive.
+   * @returns The counts; undefined if the device was lost, or this monitor destroyed meanwhile.
    */
   read(): Promise<FrameCounts | undefined> {
     return this.#staging.mapAsync(0x1).then(
@@ -184,12 +192,12 @@ export class CapacityMonitor {
   }
 
   /**
-   * Takes note of what a frame would have needed.
-   * @param picture which it was
+   * Evaluates the need of a sampled frame.
+   * @param picture The sampled frame.
    */
   judge(used: Capacity, overflowed: boolean, picture = this.#drawn): void {
     this.#memory.note({ ...picture, used, at: performance.now() });
-    // The picture at rest has no frame to learn from before it is seen.
+    // The frame at rest is shown before any measurement of it.
     const need = this.#memory.wholeNeedBy({ ...picture, used });
     const least = this.#bounds.least();
     const grown = {
@@ -206,7 +214,7 @@ export class CapacityMonitor {
       pairs: Math.max(this.#recent.pairs, need.pairs),
     };
     if (++this.#idleSamples < this.#memory.looks) return;
-    // Estimates are low where the view came nearer meanwhile.
+    // Estimates are low if the camera came closer meanwhile.
     const whole = this.#memory.wholeNeed(picture.wholePixels);
     const shrunk = {
       visible: shrink(Math.max(whole.visible, this.#recent.visible), this.#capacity.visible, least.visible),

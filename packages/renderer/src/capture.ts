@@ -9,15 +9,15 @@ import type { Viewpoint } from './viewpoint.js';
 const ROW_ALIGNMENT = 256;
 const BYTES_PER_PIXEL = 16;
 
-/** What to capture: a camera, what is behind the splats and the like, and the settings. */
+/** A camera, a target without texture, and the settings. */
 export interface CaptureRequest extends Omit<FrameTarget, 'target'> {
   readonly camera: Camera;
   readonly settings?: FrameSettings;
 }
 
 /**
- * Draws one image and reads it back in float32, before any rounding to 8 bits. Drawn again where the viewpoint's buffers had no
- * room for all of it.
+ * Draws one image and reads it back in float32, before any rounding to 8 bits. Draws again if the image did not fit the
+ * viewpoint's buffers.
  * @throws GaussianSplatError as {@link Viewpoint.draw} does, before anything is allocated.
  * @returns [height, width, 4] premultiplied red, green, blue and alpha, row by row from the top.
  */

@@ -1,4 +1,7 @@
-/** What a viewpoint checks of the arguments of its callers. The element's bundles, whose arguments are all its own, have `unchecked.ts` in its place. */
+/**
+ * Argument checks of a viewpoint. The bundles of the element, which pass only their own arguments, use `unchecked.ts`
+ * instead.
+ */
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameSettings, FrameTarget } from './frame-target.js';
 import type { RenderSettings } from './render-settings.js';
@@ -6,7 +9,7 @@ import { requireAuxiliary, requireFrameTarget, requireTarget, requireTextureSize
 
 export { renderSettingsOf as settingsOf } from './render-settings.js';
 
-/** @throws GaussianSplatError for what no frame can be drawn with, before settings are read. */
+/** @throws GaussianSplatError for arguments with which no frame can be drawn, before settings are read. */
 export function checkArguments(device: GPUDevice, camera: Camera, picture: FrameTarget, settings: FrameSettings): void {
   requireTextureSize(device, camera);
   requireFrameTarget(picture, settings);

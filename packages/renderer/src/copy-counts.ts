@@ -1,6 +1,6 @@
 import { layouts } from './generated/shaders.js';
 
-/** Copies `visible` and `overflow` of the splats, and of the pairs where there are any, four words, into a buffer. */
+/** Copies `visible` and `overflow` of the splats, and of the pairs if there are any, four words, into a buffer. */
 export function copyCounts(
   encoder: GPUCommandEncoder,
   plan: GPUBuffer,

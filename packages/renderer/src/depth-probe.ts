@@ -8,51 +8,52 @@ import { readBack } from './gpu/read-back.js';
 import { Stage } from './stages/stage.js';
 import type { ProbedSplat } from './probed-splat.js';
 
-/** A point of the image that was drawn last. */
+/** A point of the last drawn image. */
 export interface ProbePoint {
-  /** Pixels from the image's left edge; pixel centres at +0.5. */
+  /** Pixels from the left edge of the image; pixel centers are at +0.5. */
   readonly x: number;
-  /** Pixels from its top. */
+  /** Pixels from the top edge. */
   readonly y: number;
-  /** Depth along the camera's axis in world units, for {@link ProbeAnswer.transmittance}; default: beyond everything. */
+  /** Depth along the optical axis in world units, for {@link ProbeAnswer.transmittance}; default: behind everything. */
   readonly depth?: number;
 }
 
-/** What the splats do to the light that comes through a point. */
+/** Transmittance and depths of the splats along the ray of a point. */
 export interface ProbeAnswer {
-  /** 0..1: how opaque the image is there. */
+  /** 0..1: opacity of the image at the point. */
   readonly opacity: number;
   /**
-   * Depth along the camera's axis, in world units, of the visible surface: at which the splat is densest, along the ray of the point, behind which less than half
-   * of the light is left. Null if the splats let more than half of it pass.
+   * Depth of the visible surface along the optical axis, in world units: the densest depth, on the ray of the point, of
+   * the splat behind which less than half of the light is left. Null if the splats transmit more than half.
    */
   readonly depth: number | null;
-  /** The same for 90 % of the light: the first thing that is noticeable. Null if more passes. */
+  /** The same for 90 % of the light: the first noticeable splat. Null if more is transmitted. */
   readonly near: number | null;
-  /** The same for 10 % of the light. Null if more passes. `far - near` tells how thick the surface is. */
+  /** The same for 10 % of the light. Null if more is transmitted. `far - near` is the thickness of the surface. */
   readonly far: number | null;
-  /** 0..1: light that the splats in front of the point's own depth let pass. 1: nothing hides it. */
+  /** 0..1: transmittance of the splats in front of the point's own depth. 1: nothing hides it. */
   readonly transmittance: number;
-  /** The splat that {@link ProbeAnswer.depth} is of. Null where that is, and where something else than a splat is nearer. */
+  /** The splat at {@link ProbeAnswer.depth}. Null if that is null, or if a mesh is nearer. */
   readonly splat: ProbedSplat | null;
 }
 
-/** The frame to look into. */
+/** The frame to probe. */
 export interface ProbeSource {
   readonly stages: Stages;
   readonly bindings: FrameBindings;
 }
 
-/** Opacity and depth under single points of the last frame; a workgroup a point. */
+/** Finds opacity and depth under single points of the last frame, one workgroup for each point. */
 export const probeDepthStage = (device: GPUDevice): Stage<typeof probeDepth> => new Stage(device, probeDepth);
 
 const { storage, copySource, copyDestination } = BUFFER_USAGE;
 const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
-/** Word of an answer with the number of the splat of its middle depth. */
+/** Word of an answer with the index of the splat of its middle depth. */
 const STORED_AT = layouts.ProbeAnswer.fields.stored.offset / 4 + 1;
 
 /**
- * Looks into the frame that was drawn last, whatever rasterizer drew it. Reads back: for clicks and labels, not for every frame.
+ * Probes the last frame, drawn by any rasterizer. Reads back from the GPU: call it for clicks and labels, not for every
+ * frame.
  */
 export async function probe(
   device: GPUDevice,
@@ -67,7 +68,7 @@ export async function probe(
     const asked = memory.buffer('gs.probe_depth.points', words.byteLength, storage, new Uint32Array(words.buffer));
     const answers = memory.buffer('gs.probe_depth.answers', bytes, storage | copySource);
     const { plan, splats, order } = source.bindings.scratch;
-    // The list of survivors, which the surfaces need, takes the place of the order for a moment.
+    // The list of survivors, which the surfaces need, temporarily overwrites the order.
     const kept = memory.buffer('gs.probe_depth.order', order[0].size, copySource | copyDestination);
     const stage = probeDepthStage(device);
     const encoder = device.createCommandEncoder({ label: 'gs.probe_depth' });
@@ -90,7 +91,7 @@ export async function probe(
 /** Either of the two shaders. */
 type SurfaceShader = ShaderDescription & Pick<typeof probeSurface, 'bindings'>;
 
-/** Replaces depths of centers by those of surfaces, page after page. */
+/** Replaces depths of centers by those of surfaces, block by block. */
 function recordSurfaces(
   device: GPUDevice,
   pass: GPUComputePassEncoder,
@@ -119,6 +120,6 @@ function readAnswers(found: ArrayBuffer, points: number, splatOf: (stored: numbe
   });
 }
 
-/** WGSL may assume that there are no infinities. */
+/** WGSL compilers may assume that there are no infinities. */
 const LARGEST_FLOAT32 = 3.4e38;
 const finite = (value: number): number => Math.min(LARGEST_FLOAT32, Math.max(-LARGEST_FLOAT32, value));

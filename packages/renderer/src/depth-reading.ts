@@ -1,17 +1,17 @@
 import type { Camera } from '@gaussian-splat/core';
 
-/** What `device` depth means: values from one plane of a projection to the other. */
+/** Meaning of `device` depth: values between the near and the far plane of a projection. */
 export interface DepthPlanes {
-  /** True if values are 1 at the near plane and 0 at the far one. */
+  /** Whether values are 1 at the near plane and 0 at the far plane. */
   readonly reversed?: boolean | undefined;
-  /** Planes of the host's projection, world units; default: the camera's. `far` may be Infinity. */
+  /** Planes of the host's projection in world units; default: those of the camera. `far` may be Infinity. */
   readonly near?: number | undefined;
   readonly far?: number | undefined;
 }
 
 /**
- * How stored values become camera depths: the fields of the WGSL `SceneDepth`.
- * @param range what is stored for the planes: glDepthRange
+ * Conversion of stored values to camera depths: the fields of the WGSL `SceneDepth`.
+ * @param range Stored values at the planes: glDepthRange.
  */
 export function deviceReading(
   { reversed = false, near, far }: DepthPlanes,
@@ -22,7 +22,7 @@ export function deviceReading(
   // From 0 at one plane to 1 at the other.
   const [from, to] = reversed ? planes.reverse() : planes;
   const nothing = reversed ? 0 : 1;
-  // Depth, or for perspectives its reciprocal, is linear in what is stored.
+  // Depth, or its reciprocal for perspective cameras, is linear in the stored value.
   const [a, b] = camera.orthographic ? [from, to] : [1 / from, 1 / to];
   const slope = (b - a) / (high - low);
   const line = [slope, a - slope * low];

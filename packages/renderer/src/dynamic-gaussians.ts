@@ -14,38 +14,38 @@ import { countBytes, ingestValues, TensorPlaces } from './tensor-places.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
 export interface DynamicGaussiansOptions {
-  /** True if the model was trained with opacity compensation for the dilation. Default false. */
+  /** Whether the model was trained with opacity compensation for the dilation. Default false. */
   readonly antialiased?: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
-  /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
+  /** Upper limit of the GPU memory of the scene in bytes; default: no limit but the device's. */
   readonly memoryBudget?: number;
 }
 
 const ORIGIN: Vector3 = [0, 0, 0];
-/** Sets of tensors whose bindings are kept: a generator's outputs go around in few buffers. */
+/** Sets of tensors with cached bindings: a generator cycles through a few output buffers. */
 const MAX_BINDINGS = 8;
 
-/** What a sample of the rows of a run shows. */
+/** Statistics of a sample of the rows of a run. */
 export interface RowSample {
-  /** Of the rows with an opacity above 0. */
+  /** Bounds of the rows with an opacity above 0. */
   readonly bounds: Bounds;
   /** Rows with an opacity above 0. */
   readonly drawn: number;
-  /** Rows with numbers that cannot be drawn: not finite, beyond all bounds, no extent, or a rotation of zeros. */
+  /** Rows with unusable numbers: not finite, out of range, zero extent, or a zero rotation. */
   readonly unusable: number;
 }
 
-/** A page with what only its filling needs. */
+/** A block with its resources for filling. */
 interface DynamicPage extends GaussianPage {
-  /** Number of its first row among all rows. */
+  /** Index of its first row among all rows. */
   readonly first: number;
   /** `Ingest` of shaders/ingest.wgsl. */
   readonly uniform: GPUBuffer;
 }
 
 /**
- * Gaussians that a generator writes anew as often as it likes, on the GPU from end to end.
+ * Gaussians that a generator rewrites at any rate, entirely on the GPU.
  *
  * ```ts
  * const gaussians = await DynamicGaussians.create(device, gaussianLayout(header, contract));
@@ -53,16 +53,17 @@ interface DynamicPage extends GaussianPage {
  * viewpoint.draw(camera, { target: texture });
  * ```
  *
- * The tensors of a run are one copy of the Gaussians, the packed pages that are drawn the other. {@link ingest} goes from one to
- * the other in a single submission, so that a frame shows all of one run or all of another, however long the next run takes.
+ * The tensors of a run are one copy of the Gaussians, the packed blocks that are drawn are the other. {@link ingest}
+ * converts one to the other in a single submission, so that every frame shows exactly one run, however long the next
+ * one takes.
  */
 export class DynamicGaussians implements GaussianScene {
-  /** Rows for which there is room. */
+  /** Capacity in rows. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision = 'float16';
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   readonly origin = ORIGIN;
   readonly pages: readonly DynamicPage[];
@@ -76,7 +77,7 @@ export class DynamicGaussians implements GaussianScene {
   #version = 0;
   #rows = -1;
   #dropped = 0;
-  /** Rows of other scenes before this one's that the places in the uniforms stand for. */
+  /** Rows of other scenes in front of this scene's, as the offsets in the uniforms assume. */
   #before = 0;
 
   private constructor(device: GPUDevice, layout: GaussianLayout, options: DynamicGaussiansOptions) {
@@ -97,14 +98,15 @@ export class DynamicGaussians implements GaussianScene {
       this.destroy();
       throw error;
     }
-    // Until the first run there is nothing to see.
+    // Nothing is visible before the first run.
     this.ingest({}, 0);
   }
 
   /**
-   * Allocates room for what a generator can write at most.
-   * @param layout as core's `gaussianLayout` finds it
-   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/allocation` if the device has no room.
+   * Allocates memory for the largest output of a generator.
+   * @param layout As `gaussianLayout` of core returns it.
+   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/allocation` if the
+   * device has too little memory.
    */
   static async create(
     device: GPUDevice,
@@ -114,28 +116,29 @@ export class DynamicGaussians implements GaussianScene {
     return withMemoryCheck(device, whatOf(layout), () => new DynamicGaussians(device, layout, options));
   }
 
-  /** Number of runs taken in until now, and one. */
+  /** Number of ingested runs, plus one. */
   get version(): number {
     return this.#version;
   }
 
-  /** Bytes of GPU memory held; the tensors belong to the generator. */
+  /** Bytes of allocated GPU memory; the tensors belong to the generator. */
   get byteLength(): number {
     return this.#memory.byteLength;
   }
 
   /**
-   * Takes over what a run wrote: encodes and submits one compute pass; nothing is read back, and once a set of buffers has been
-   * seen nothing is created. The tensors may be overwritten by anything submitted afterwards.
+   * Ingests the output of a run: encodes and submits one compute pass. Nothing is read back, and nothing is created for
+   * a set of buffers that was used before. The tensors may be overwritten by anything submitted afterwards.
    *
-   * Rows from the live count on, and rows with numbers that cannot be used, are not drawn.
-   * @param tensors storage buffers by the names of the layout's tensors; that of the count needs COPY_SRC. Sizes of float16 tensors
-   * are rounded up to 4 bytes.
-   * @param rows number of rows that this run wrote, 0 to the layout's capacity, or its padded rows. With 0 no tensor is needed.
-   * @param instance of a run that wrote several scenes of `rows` rows one after the other in each tensor, which is this one; default the first.
-   * A live count is then element `instance` of its tensor.
-   * @throws GaussianSplatError `contract/rows` if there are more rows than capacity; `argument/value` for a tensor that is missing or
-   * too small. What was shown before stays.
+   * Rows from the live count on, and rows with unusable numbers, are not drawn.
+   * @param tensors Storage buffers by the names of the layout's tensors; that of the count needs COPY_SRC. Sizes of
+   * float16 tensors are rounded up to 4 bytes.
+   * @param rows Number of rows that this run wrote, 0 to the layout's capacity, or its padded rows. For 0 no tensor is
+   * required.
+   * @param instance Index of this scene in a run that wrote several scenes of `rows` rows in sequence to each tensor;
+   * default 0. A live count is then element `instance` of its tensor.
+   * @throws GaussianSplatError `contract/rows` if the rows exceed the capacity; `argument/value` for a missing or too
+   * small tensor. The previous content remains.
    */
   ingest(tensors: Readonly<Record<string, GPUBuffer>>, rows: number, instance = 0): void {
     requireRows(rows, this.layout.paddedRows ?? this.count);
@@ -159,14 +162,14 @@ export class DynamicGaussians implements GaussianScene {
   }
 
   /**
-   * Where the splats are, from a sample of up to 65,536 of them. Reads back from the GPU: for framing a camera once, not for
-   * every frame.
+   * Returns the bounds of the splats, from a sample of up to 65,536 of them. Reads back from the GPU: call it once to
+   * frame a camera, not for every frame.
    */
   async readBounds(): Promise<Bounds> {
     return (await this.readSample()).bounds;
   }
 
-  /** The same sample, with the numbers of its rows. */
+  /** Returns the same sample, with the numbers of its rows. */
   async readSample(): Promise<RowSample> {
     const places = await readPlaces(this.#device, this.pages);
     this.#dropped = places.unusable;
@@ -177,7 +180,7 @@ export class DynamicGaussians implements GaussianScene {
     };
   }
 
-  /** Rows with numbers that cannot be drawn, in the last sample that was read. */
+  /** Rows with unusable numbers in the last sample. */
   get droppedCount(): number {
     return this.#dropped;
   }
@@ -213,7 +216,7 @@ export class DynamicGaussians implements GaussianScene {
     return pages;
   }
 
-  /** Without a count tensor all rows live. */
+  /** Without a count tensor all rows are live. */
   #writeRows(rows: number): void {
     if (rows === this.#rows) return;
     this.#rows = rows;
@@ -223,7 +226,7 @@ export class DynamicGaussians implements GaussianScene {
     for (const { uniform } of this.pages) this.#device.queue.writeBuffer(uniform, count.offset, words);
   }
 
-  /** Bindings begin where the device lets them; the places in a uniform lead from there to the rows. */
+  /** The device aligns the offsets of bindings; the offsets in the uniform lead from there to the rows. */
   #writePlaces(before: number): void {
     if (before === this.#before) return;
     this.#before = before;

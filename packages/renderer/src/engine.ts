@@ -10,20 +10,20 @@ import { requireBlendable } from './requirements.js';
 import type { ComposeBindings } from './stages/compose.js';
 import type { Variants } from './variants.js';
 
-/** What an image size needs where the rasterizer cannot write the target. */
+/** Accumulation for an image size, if the rasterizer cannot write to the target. */
 export interface Accumulation {
   readonly texture: AccumulationTexture;
   readonly compose: ComposeBindings;
 }
 
-/** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
+/** Resources that depend on the rasterizer, the accumulation format, and the workgroup variant of the stages. */
 export class Engine {
   readonly settings: RenderSettings & Variants;
   readonly stages: Stages;
   readonly rasterizer: Rasterizer;
   readonly resources: FrameResources;
   readonly #device: GPUDevice;
-  /** By size, the one used last at the end. */
+  /** Keyed by size; the most recently used is last. */
   readonly #accumulations = new Map<string, Accumulation>();
 
   /** @throws GaussianSplatError `unsupported/limits` if the variant needs a feature that the device lacks. */
@@ -39,7 +39,7 @@ export class Engine {
     this.resources = new FrameResources(device, { stages: this.stages, rasterizer: this.rasterizer, ...needs });
   }
 
-  /** Whether frames of these settings can be drawn with it. */
+  /** Whether frames with these settings can be drawn with it. */
   serves({ rasterizer, accumulation, threads }: Variants): boolean {
     const { settings } = this;
     return rasterizer === settings.rasterizer && accumulation === settings.accumulation && threads === settings.threads;
@@ -51,9 +51,9 @@ export class Engine {
   }
 
   /**
-   * What splats are accumulated in.
-   * @param most sizes that are kept
-   * @param bind binds the texture of a new size
+   * Returns the accumulation of an image size.
+   * @param most Maximum number of cached sizes.
+   * @param bind Binds the texture of a new size.
    */
   accumulationOf(
     { width, height }: Pick<Camera, 'width' | 'height'>,

@@ -7,14 +7,14 @@ import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
 import type { World } from './world.js';
 
-/** Room for pairs that the pacer learns from what one costs. */
+/** Capacity in pairs with which the pacer can measure their cost. */
 const TELLING_ROOM = 1 << 18;
-/** Share of the room that scenes which are left must need: else it is given back. */
+/** Minimum usage of the capacity after scenes are removed; below it the capacity is released. */
 const LEAST_USED = 0.5;
-/** Submissions that painting a frame may always be divided into: each takes the page's thread some tenths of a millisecond. */
+/** Every frame may be divided into this many submissions: each takes the main thread a few tenths of a millisecond. */
 const FEW_SUBMISSIONS = 4;
 
-/** What a set of scenes needs on the GPU between the stages. */
+/** GPU resources between the stages for a set of scenes. */
 export interface Resources {
   readonly table: PageTable;
   readonly scratch: Scratch;
@@ -25,13 +25,13 @@ export interface Resources {
 export interface ResourceOptions {
   readonly stages: Stages;
   readonly rasterizer: Rasterizer;
-  /** Pairs of splat and bin that are painted in one submission. */
+  /** Pairs of splat and bin that are rasterized in one submission. */
   readonly pairsAtOnce: () => number;
-  /** A frame lacked room, and the next one has it. */
+  /** Called after an incomplete frame, when the next one has enough capacity. */
   readonly onIncomplete: () => void;
 }
 
-/** Sees to buffers between the stages for the scenes at hand, as large as what is visible of them needs. */
+/** Manages the buffers between the stages for the current scenes, sized by the visible part of them. */
 export class FrameResources {
   readonly #device: GPUDevice;
   readonly #options: ResourceOptions;
@@ -40,10 +40,10 @@ export class FrameResources {
   #capacity: Capacity | undefined;
   #memory = new CapacityHistory();
   #hasOtherPairs = false;
-  /** What the rasterizer was last bound to, of what may be replaced. */
+  /** The current binding of the rasterizer to the buffers that may be replaced. */
   #boundPlan: GPUBuffer | undefined;
   #hasQuickPairs = false;
-  /** The largest budget of splats that a frame has been given. */
+  /** Largest splat budget of any frame. */
   #mostSplats: number | undefined;
 
   constructor(device: GPUDevice, options: ResourceOptions) {
@@ -51,12 +51,12 @@ export class FrameResources {
     this.#options = options;
   }
 
-  /** What the last frame was drawn with; undefined before the first. */
+  /** Resources of the last frame; undefined before the first. */
   get current(): Resources | undefined {
     return this.#current;
   }
 
-  /** Pairs of splat and bin for which there is room; 0 before the first frame. */
+  /** Capacity in pairs of splat and bin; 0 before the first frame. */
   get pairCapacity(): number {
     return this.#capacity?.pairs ?? 0;
   }
@@ -67,14 +67,14 @@ export class FrameResources {
   }
 
   /**
-   * What a frame is drawn with: allocates where the scenes or the wished room are other ones than before.
-   * @param splatBudget most splats that the frame draws; 0 for no limit
+   * Returns the resources of a frame; allocates if the scenes or the requested capacity have changed.
+   * @param splatBudget Maximum number of splats in the frame; 0 for no limit.
    */
   fit(world: World, splatBudget: number): Resources {
     this.#roomFor(splatBudget);
     const current = this.#current;
     if (current?.table.isCurrent) {
-      // The monitor has asked for other room.
+      // The monitor has requested another capacity.
       const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
       return hasOtherRoom ? this.#rebind(current.table) : current;
     }
@@ -85,7 +85,7 @@ export class FrameResources {
     return this.#rebind(table);
   }
 
-  /** Scenes have come or gone: what still has room stays, what has not is made larger by what came. */
+  /** The set of scenes has changed: buffers that are large enough stay, the others grow by the size of the new scenes. */
   #layAnew({ table }: Resources): Resources {
     const before = table.splats;
     table.lay();
@@ -106,7 +106,7 @@ export class FrameResources {
     return this.#rebind(table);
   }
 
-  /** Visible splats to have room for when `coming` more may be visible. Room that is empty counts. */
+  /** Capacity in visible splats if `coming` more may become visible, including unused capacity. */
   #visibleWith(coming: number, most: Capacity): number {
     const { visible } = this.#capacity!;
     const { lastNeed } = this.#memory;
@@ -126,7 +126,7 @@ export class FrameResources {
     this.#boundPlan = undefined;
   }
 
-  /** A larger budget of splats than before makes other room. */
+  /** A larger splat budget than before requires another capacity. */
   #roomFor(splatBudget: number): void {
     const most = splatBudget > 0 ? splatBudget : Infinity;
     if (this.#mostSplats !== undefined && most > this.#mostSplats) this.release();
@@ -147,18 +147,19 @@ export class FrameResources {
   }
 
   /**
-   * A streamed scene within a budget keeps the room that it is given at first: flights turn from a near wall to everything within a frame. That for pairs, by which the painting
-   * is divided, it keeps as soon as a few submissions are known to paint them all.
+   * A streamed scene with a budget keeps its initial capacity, because a flight may turn from a near wall to the whole
+   * scene within a frame. It keeps the capacity for pairs, which determines the number of submissions, once a few
+   * submissions are known to be enough.
    */
   #leastFor(table: PageTable): Capacity {
     if (!this.#isBudgeted(table)) return LEAST_CAPACITY;
     const { visible, pairs } = this.#firstFor(table);
-    // Never taken back: room that comes and goes would be allocated each time.
+    // Never reset, because an alternating capacity would be reallocated each time.
     this.#hasQuickPairs ||= FEW_SUBMISSIONS * this.#options.pairsAtOnce() >= pairs;
     return { visible, pairs: this.#hasQuickPairs ? pairs : Math.min(pairs, TELLING_ROOM) };
   }
 
-  /** Allocates and binds what lies between the stages, for the capacity at hand. */
+  /** Allocates and binds the buffers between the stages, for the current capacity. */
   #rebind(table: PageTable): Resources {
     const { stages } = this.#options;
     const capacity = this.#capacity!;

@@ -5,25 +5,25 @@ import { renderSettingsOf } from './render-settings.js';
 import type { Resource } from './gpu/kernel.js';
 import type { AuxiliaryOutputs, PaintingDepth, Surface } from './rasterizers/rasterizer.js';
 
-/** Red, green, blue and alpha, colour premultiplied. */
+/** Red, green, blue and alpha; color premultiplied. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
 
-/** A view of a texture, with what cannot be asked of it. */
+/** A texture view, with the properties that cannot be queried. */
 export interface TargetView {
   readonly view: GPUTextureView;
-  /** Any colour format that WebGPU can render to. */
+  /** Any color format that WebGPU can render to. */
   readonly format: GPUTextureFormat;
 }
 
-/** A target that has been checked. */
+/** A validated target. */
 export interface Target extends Surface {
-  /** Where more is known of it than a view. */
+  /** The texture, if it is known. */
   readonly texture?: GPUTexture | undefined;
   /** Whether a compute shader may write it. */
   readonly isStorable: boolean;
 }
 
-/** Lays accumulated splats over what is behind them, in place of the viewpoint's own way: see {@link LinearColours}. */
+/** Composes accumulated splats over the background, instead of the viewpoint's default: see {@link LinearColors}. */
 export interface Composer {
   compose(
     encoder: GPUCommandEncoder,
@@ -33,30 +33,32 @@ export interface Composer {
   ): void;
 }
 
-/** What a frame is drawn into. */
+/** Target of a frame. */
 export interface FrameTarget {
   /**
-   * As large as the camera's image. A texture with the usage STORAGE_BINDING saves `tiles` a pass; of one with several levels or layers the first is
-   * drawn into.
+   * A texture or view of the size of the camera's image. A texture with the usage STORAGE_BINDING saves `tiles` a pass;
+   * of several levels or layers the first is the target.
    */
   readonly target: GPUTexture | TargetView;
-  /** What is behind the splats: a colour, or what the target holds already. Default: transparent. */
+  /** Background of the splats: a color, or the content of the target. Default: transparent. */
   readonly over?: Rgba | 'target' | undefined;
-  /** How colours are written: a {@link LinearColours} for targets of linear light. Default: encoded as sRGB, as scenes are trained. */
+  /**
+   * Color conversion: a {@link LinearColors} for targets of linear light. Default: sRGB-encoded, as scenes are trained.
+   */
   readonly colours?: Composer | undefined;
-  /** Depth of what else is in the frame, and where to write that of the splats: a {@link SceneDepth}. */
+  /** Depth of the meshes in the frame, and the destination of the splats' depth: a {@link SceneDepth}. */
   readonly depth?: PaintingDepth | undefined;
-  /** Low-pass filter of all scenes of the frame. Default: the one that each was trained with, as far as its file tells. */
+  /** Low-pass filter of all scenes of the frame. Default: that of the training of each scene, if its file states it. */
   readonly filter?: SplatFilter | undefined;
-  /** What to note besides the image: `tiles` only, and not for every frame. */
+  /** Auxiliary outputs besides the image: `tiles` only, and not for every frame. */
   readonly auxiliary?: AuxiliaryOutputs | undefined;
-  /** Notes when each pass ran. */
+  /** Records when each pass ran. */
   readonly timer?: FrameTimer | undefined;
 }
 
 /**
- * How a frame is drawn: a quality, and single settings that differ from it. Give the same object for the same settings: what they take is remembered by the
- * object. See {@link settings}.
+ * Settings of a frame: a quality, and single settings that override it. Reuse one object for the same settings, because
+ * derived values are cached by object. See {@link settings}.
  */
 export interface FrameSettings extends Partial<RenderSettings> {
   /** Default: `default`. */
@@ -64,11 +66,11 @@ export interface FrameSettings extends Partial<RenderSettings> {
 }
 
 /**
- * Settings for frames, checked.
+ * Returns validated settings for frames.
  *
  * ```ts
  * const moving = settings('balanced', { resolutionScale: 0.7 });
- * viewpoint.draw(camera, picture, moving);
+ * viewpoint.draw(camera, { target: texture }, moving);
  * ```
  * @throws GaussianSplatError `argument/value` for an unknown quality or a value out of its range.
  */

@@ -6,30 +6,30 @@ import type { RenderSettings } from './render-settings.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 import type { Scratch } from './scratch.js';
 
-/** What the stages before the rasterizer need, bound and allocated beforehand. */
+/** Inputs of the stages before the rasterizer, bound and allocated in advance. */
 export interface Frame {
   readonly stages: Stages;
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
   readonly camera: Camera;
   readonly levers: FeedbackSettings & Pick<RenderSettings, 'depthKeyBits'>;
-  /** Whether {@link Scratch.survivors} is to list the numbers of the visible splats by slot, for auxiliary outputs. */
+  /** Whether to list the indices of the visible splats by slot in {@link Scratch.survivors}, for auxiliary outputs. */
   readonly keepsSurvivors: boolean;
-  /** Whether a page has levels of detail. */
+  /** Whether a block has levels of detail. */
   readonly hasDetail: boolean;
-  /** Whether to keep the splats that are looked at within `RenderSettings.splatBudget`. */
+  /** Whether to limit the splats to `RenderSettings.splatBudget`. */
   readonly isBudgeted: boolean;
-  /** Orders splats pixel by pixel. */
+  /** Sorts splats for each pixel. */
   readonly order: PixelOrder | undefined;
-  /** Whether the rasterizer needs the depths of the splats: keys must be depths. */
+  /** Whether the rasterizer needs the depths of the splats, so that keys must be depths. */
   readonly keepsDepths: boolean;
   readonly timer?: FrameTimer | undefined;
 }
 
 /**
- * Records what turns Gaussians into projected splats from near to far: cull, project, sort. Counts travel in `plan`; nothing comes back to
- * the CPU.
- * @returns what must be copied at the end of the frame and read after the submit: pages that streamed scenes lack
+ * Records the projection of Gaussians to splats, sorted from near to far: cull, project, sort. Counts stay in `plan` on
+ * the GPU; the CPU reads nothing.
+ * @returns Page requests of streamed scenes, to be copied at the end of the frame and read after the submit.
  */
 export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): PageRequests[] {
   const { scratch, bindings, timer } = frame;
@@ -37,7 +37,7 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
   for (const request of requests) request.begin(encoder);
   encoder.clearBuffer(scratch.gathered);
   if (frame.isBudgeted) encoder.clearBuffer(scratch.detailCounts);
-  // What the last budget allowed.
+  // Clears the threshold of an earlier budget.
   else if (frame.hasDetail) encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
   if (frame.isBudgeted) keepWithinBudget(pass, bindings);
@@ -55,14 +55,14 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
   return requests;
 }
 
-/** Finds the error on screen that leaves as many splats as the frame may look at. */
+/** Finds the error threshold on screen that keeps the frame within its splat budget. */
 function keepWithinBudget(pass: GPUComputePassEncoder, { pages, budget }: FrameBindings): void {
   if (!budget) return;
   pages.forEach(({ splatCount }, i) => budget.stages.count.record(pass, budget.count[i], splatCount));
   budget.stages.allow.record(pass, budget.allow);
 }
 
-/** Streamed scenes that want to know now which pages the view asks for. */
+/** Streamed scenes that are due to record page requests in this frame. */
 function feedbackDue({ bindings, camera, levers }: Frame): PageRequests[] {
   const all = new Set(bindings.pages.flatMap(({ requests }) => (requests ? [requests.of] : [])));
   return [...all].filter((requests) => requests.isDue(camera, levers));
@@ -74,13 +74,13 @@ function recordFeedback(pass: GPUComputePassEncoder, { bindings }: Frame, due: r
   }
 }
 
-/** Lists the visible splats of the last frame once more, in the place of their order: the same as in that frame. */
+/** Lists the visible splats of the last frame again, over their order: the list is the same as in that frame. */
 export function recordSurvivors(pass: GPUComputePassEncoder, frame: Pick<Frame, 'stages' | 'bindings'>): void {
   cull(pass, frame);
   listSurvivors(pass, frame);
 }
 
-/** Finds the visible splats: whole chunks first, then one by one. */
+/** Finds the visible splats: culls whole chunks first, then single splats. */
 function cull(pass: GPUComputePassEncoder, { bindings }: Pick<Frame, 'bindings'>): void {
   for (const { reading, cullChunks, splatCount } of bindings.pages)
     reading.cullChunks.record(pass, cullChunks, splatCount);
@@ -92,7 +92,7 @@ function listSurvivors(pass: GPUComputePassEncoder, { stages, bindings }: Pick<F
   for (const { compact, splatCount } of bindings.pages) stages.compact.record(pass, compact, splatCount);
 }
 
-/** Orders the projected splats from near to far, equal depths in the file's order. */
+/** Sorts the projected splats from near to far; splats of equal depth keep the order of the file. */
 function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, levers, timer }: Frame): void {
   const pass = encoder.beginComputePass({ label: 'gs.sort', timestampWrites: timer?.timestampWrites('sort') });
   stages.sort.record(pass, bindings.sort(levers.depthKeyBits), scratch.capacity);

@@ -11,7 +11,7 @@ import type { DetailBudget } from './stages/detail-budget.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 export interface UploadOptions {
-  /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
+  /** Upper limit of the GPU memory of the scene in bytes; default: no limit but the device's. */
   readonly memoryBudget?: number | undefined;
 }
 
@@ -23,23 +23,23 @@ export type PackedPortion = Partial<Pick<PackedGaussians, 'geometry' | 'sh' | 'c
 
 /** Gaussians on the GPU, ready for any {@link Viewpoint} of the same device. */
 export class GaussianBuffers implements GaussianScene {
-  /** Splats of all levels of detail together. */
+  /** Splats over all levels of detail. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
-  /** True if the scene was trained with opacity compensation; the renderer follows. */
+  /** Whether the scene was trained with opacity compensation, which the renderer then applies. */
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
-  /** World position, in float64, that the positions on the GPU are relative to. */
+  /** World position, in float64, of the origin of the positions on the GPU. */
   readonly origin: Vector3;
   /** Splats of the finest level, if there are levels of detail. */
   readonly leafCount: number | undefined;
-  /** Splats of the source that were left out because a value was not usable. */
+  /** Splats of the source that were dropped because of an unusable value. */
   readonly droppedCount: number;
   readonly pages: readonly GaussianPage[];
   readonly version = 0;
-  /** If there are levels of detail. */
+  /** Only with levels of detail. */
   readonly detailBudget: DetailBudget | undefined;
   readonly #queue: GPUQueue;
   readonly #memory: GpuMemory;
@@ -69,10 +69,11 @@ export class GaussianBuffers implements GaussianScene {
   }
 
   /**
-   * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for, and in portions that leave the thread time for other things.
-   * @throws GaussianSplatError `out-of-memory/budget`, before anything is allocated, if the scene is larger than `memoryBudget` or than what the
-   * device's {@link MemoryLedger} has left for all scenes; `out-of-memory/allocation` if the device has no room; `network/unreachable` if the code for levels of detail
-   * cannot be loaded.
+   * Uploads packed Gaussians to the GPU, in as many blocks as the limits of the device require, and in portions that
+   * leave the thread time for other tasks.
+   * @throws GaussianSplatError `out-of-memory/budget`, before anything is allocated, if the scene is larger than
+   * `memoryBudget` or than the rest of the device's {@link MemoryLedger}; `out-of-memory/allocation` if the device has
+   * too little memory; `network/unreachable` if the code for levels of detail cannot be loaded.
    */
   static async upload(
     device: GPUDevice,
@@ -127,7 +128,7 @@ export class GaussianBuffers implements GaussianScene {
     ];
   }
 
-  /** Bytes of GPU memory held. */
+  /** Bytes of allocated GPU memory. */
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -138,7 +139,7 @@ export class GaussianBuffers implements GaussianScene {
   }
 }
 
-/** Few scenes have levels of detail. */
+/** Loaded on demand, because few scenes have levels of detail. */
 const budgetOn = (device: GPUDevice): Promise<DetailBudget> =>
   loadModule('the code for budgets of splats', async () => {
     const { detailBudgetOn } = await import('./stages/detail-budget.js');
@@ -194,7 +195,7 @@ function makePages(device: GPUDevice, packed: SceneSize, memory: GpuMemory): Gau
   return pages;
 }
 
-/** Words that are handed to the GPU at once: 4 MB, some milliseconds. */
+/** Words uploaded in one step: 4 MB, a few milliseconds. */
 const WORDS_AT_ONCE = 1 << 20;
 
 async function writeInTurns({ queue }: GPUDevice, contents: readonly Content[]): Promise<void> {
@@ -211,7 +212,7 @@ async function writeInTurns({ queue }: GPUDevice, contents: readonly Content[]):
     }
 }
 
-/** Splats in a page of so many bytes a splat: what the limits allow, in whole chunks, of which one dispatch takes a row. */
+/** Splats in a block at this many bytes each: as many whole chunks as the limits allow, with one dispatch row each. */
 export function pageCapacity(device: GPUDevice, bytesPerSplat: number): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   const splats = Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / bytesPerSplat);

@@ -5,12 +5,12 @@ import type { RenderSettings } from './render-settings.js';
 import type { DetailBudget } from './stages/detail-budget.js';
 import type { ShPrecision } from './pack/words.js';
 
-/** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
+/** Gaussians in the largest buffers that a shader can bind on the device. */
 export interface GaussianPage {
   readonly count: number;
   /** array<PackedGaussian>, unless {@link reading} says otherwise */
   readonly geometry: GPUBuffer;
-  /** Of a page with geometry of another kind. */
+  /** Only for another kind of geometry. */
   readonly reading?: GeometryReading;
   /** array<vec2u>: spherical harmonics, see pack/sh.ts */
   readonly sh: GPUBuffer;
@@ -20,17 +20,23 @@ export interface GaussianPage {
   readonly details?: GPUBuffer;
 }
 
-/** What {@link PageRequests} are noted from: a view, and of a page of the pool what lies there. */
+/** Inputs of {@link PageRequests}: a view, and the content of a page of the pool. */
 export type FeedbackInputs = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
 
-/** Settings that say which pages a view asks for. */
+/** Settings that influence which pages a view requests. */
 export type FeedbackSettings = Pick<RenderSettings, 'detail' | 'detailFade' | 'splatBudget'>;
 
-/** Carries the pages that a view asks for from a frame to the code that fetches them. Streamed scenes bring their own, so that no other page loads it. */
+/**
+ * Carries the pages that a view requests from a frame to the streaming code. Streamed scenes provide it, so that it is
+ * loaded only with them.
+ */
 export interface PageRequests {
   /** Binds a page of the pool, for {@link PageRequests.note}. */
   bind(page: FeedbackInputs): GPUBindGroup;
-  /** Called with the camera and the settings of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
+  /**
+   * Called with the camera and the settings of each frame. Returns true if this frame should record requests; then the
+   * other four are called in turn, `note` for each page of the pool, `read` after the submit.
+   */
   isDue(camera: Camera, levers: FeedbackSettings): boolean;
   begin(encoder: GPUCommandEncoder): void;
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
@@ -39,27 +45,30 @@ export interface PageRequests {
 }
 
 /**
- * What a {@link Viewpoint} draws: Gaussians on the GPU. `GaussianBuffers` holds those of a file, `DynamicGaussians` those that a
- * generator writes. Everything but the content of the buffers stays the same for as long as the scene lives.
+ * Gaussians on the GPU for a {@link Viewpoint}. `GaussianBuffers` holds those of a file, `DynamicGaussians` those of a
+ * generator. Only the content of the buffers changes during its lifetime.
  */
 export interface GaussianScene {
-  /** Splats for which there is room; all of them are drawn, but for those that paint nothing. */
+  /** Capacity in splats; all of them are processed, but transparent ones paint nothing. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
-  /** True if the scene was trained with opacity compensation; the renderer follows. */
+  /** Whether the scene was trained with opacity compensation, which the renderer then applies. */
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
-  /** World position, in float64, that the positions on the GPU are relative to. */
+  /** World position, in float64, of the origin of the positions on the GPU. */
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
-  /** Of a scene with levels of detail: what keeps its frames within `RenderSettings.splatBudget`. Such scenes bring it, so that no other page loads it. */
+  /**
+   * Only for a scene with levels of detail: keeps its frames within `RenderSettings.splatBudget`. Such scenes provide
+   * it, so that it is loaded only with them.
+   */
   readonly detailBudget?: DetailBudget | undefined;
-  /** Of a scene that is streamed: where views record the pages that they need. */
+  /** Only for a streamed scene: receives the pages that views need. */
   readonly pageRequests?: PageRequests;
-  /** Called before each frame: a streamed scene uploads what has come. */
+  /** Called before each frame: a streamed scene uploads the received pages. */
   update?(): void;
-  /** Grows whenever the content of the buffers changes; 0 for a scene that never does. */
+  /** Incremented whenever the content of the buffers changes; 0 for a scene that never changes. */
   readonly version: number;
 }

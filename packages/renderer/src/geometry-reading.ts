@@ -7,19 +7,23 @@ import type { ShaderDescription } from './gpu/kernel.js';
 export type Like<S extends ShaderDescription> = ShaderDescription & Pick<S, 'bindings'>;
 
 /**
- * The shaders that read the geometry of a page. Pages that are stored in another way than `PackedGaussian` bring their own, so that no other page loads them.
+ * The shaders that read the geometry of a block. Blocks in another layout than `PackedGaussian` provide their own, so
+ * that these are loaded only with them.
  */
 export interface GeometryReading {
   readonly cull: Like<typeof cull>;
   readonly cullSerial: Like<typeof cullSerial>;
   readonly project: Like<typeof project>;
-  /** In place of those that all kinds share, or that go with the geometry. */
+  /** Replacements for shaders that are independent of the geometry. */
   readonly cullChunks?: Like<typeof cullChunks>;
   readonly pixelDepths?: Like<typeof pixelDepths>;
   readonly probeSurface?: Like<typeof probeSurface>;
 }
 
-/** What changes the splats of a placement while they are projected: a `SplatModifier`. Pages that use one bring it, so that no other page loads it. */
+/**
+ * Modifies the splats of a placement during projection: a `SplatModifier`. Pages that use one provide it, so that it is
+ * loaded only with them.
+ */
 export interface PlacementModifier {
   /** Holds the `Modifiers` of the placement. */
   readonly values: GPUBuffer;

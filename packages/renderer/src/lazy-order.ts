@@ -2,9 +2,9 @@ import { loadModule } from '@gaussian-splat/core';
 import { perDevice } from './gpu/kernel.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 
-/** What `order: 'pixel'` needs of a device: fetched when a frame first asks for it. */
+/** Device resources of `order: 'pixel'`, loaded when a frame first requests it. */
 export interface LazyOrder {
-  /** Undefined until it is there. */
+  /** Undefined until it is loaded. */
   now?: PixelOrder;
   /** @throws GaussianSplatError `network/unreachable` */
   load(): Promise<unknown>;

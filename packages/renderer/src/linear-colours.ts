@@ -4,18 +4,18 @@ import { perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Resource } 
 import type { Composer, Target } from './frame-target.js';
 
 /**
- * Colours of a target that holds linear light, as of a host whose output pass encodes later, or of a `-srgb` format. Splats are blended in encoded colours, as
- * they were trained, with what the target holds, too.
+ * Colors of a target that holds linear light, for example of a host with a later output pass, or of a `-srgb` format.
+ * Splats are blended in encoded colors, as in training, including the content of the target.
  *
  * ```ts
- * const colours = new LinearColours(device);
- * viewpoint.draw(camera, { target, over: 'target', colours });
+ * const colors = new LinearColors(device);
+ * viewpoint.draw(camera, { target, background: 'load', colors });
  * ```
  */
 export class LinearColours implements Composer {
   readonly #device: GPUDevice;
   readonly #program: ShaderProgram<typeof composeLinear>;
-  /** A copy of what the target held. */
+  /** A copy of the previous content of the target. */
   #content: GPUTexture | undefined;
   #bound: { readonly key: readonly Resource[]; readonly group: GPUBindGroup } | undefined;
 
@@ -25,7 +25,7 @@ export class LinearColours implements Composer {
     this.#program = perDevice(device, composeLinear.name, () => new ShaderProgram(device, composeLinear, both));
   }
 
-  /** @throws GaussianSplatError `argument/value` for a target whose content is asked for and cannot be copied. */
+  /** @throws GaussianSplatError `argument/value` if the content of the target is needed and cannot be copied. */
   compose(
     encoder: GPUCommandEncoder,
     resources: Readonly<Record<'compose' | 'accumulated', Resource>>,

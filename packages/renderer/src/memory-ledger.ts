@@ -2,12 +2,12 @@ import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { constants } from './generated/shaders.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
-/** GPU memory that one splat of a scene takes, in bytes, before a single one is uploaded. */
+/** GPU memory of one splat of a scene in bytes, known before the upload. */
 export function bytesPerSplat(shDegree: ShDegree, shPrecision: ShPrecision): number {
   return 4 * (GEOMETRY_WORDS + shWords(shDegree, shPrecision)) + (4 * CHUNK_NUMBERS) / constants.CULL_GROUP;
 }
 
-/** Bytes that one owner holds; given back once. */
+/** Bytes that one owner holds; released once. */
 export interface Reservation {
   readonly label: string;
   readonly bytes: number;
@@ -15,22 +15,22 @@ export interface Reservation {
 }
 
 /**
- * What the scenes on a device hold, and how much they may. WebGPU does not tell how much memory a GPU has: without a budget everything
- * is let through, and the device itself refuses.
+ * GPU memory of the scenes on a device, and its budget. WebGPU does not report the memory of a GPU: without a budget
+ * every request is granted, until the device itself fails.
  */
 export class MemoryLedger {
-  /** Most bytes that all scenes of the device together may hold. */
+  /** Upper limit of the bytes of all scenes of the device together. */
   budgetBytes = Infinity;
-  /** Bytes that scenes out of sight may hold while others are loaded. */
+  /** Upper limit of the bytes of off-screen scenes while others are loaded. */
   unseenBytes = Infinity;
   /**
-   * Functions that give back what will soon not be needed any more, called one after the other if there is no room for a request; with the bytes of those
-   * that are out of sight, which are called if these hold more than {@link unseenBytes}, too.
+   * Functions that release memory that will soon be unnecessary, called in order until a request fits, with their bytes
+   * in off-screen scenes. These are also called if their sum exceeds {@link unseenBytes}.
    */
   readonly spare = new Map<() => void, number>();
   readonly #held = new Set<Reservation>();
 
-  /** The ledger of a device, or of a context of WebGL; all scenes on it share one. */
+  /** Returns the ledger of a device, or of a WebGL context; all its scenes share one. */
   static of(device: GPUDevice | WebGL2RenderingContext): MemoryLedger {
     const known = LEDGERS.get(device);
     if (known) return known;
@@ -39,7 +39,7 @@ export class MemoryLedger {
     return ledger;
   }
 
-  /** What is held, by owner. */
+  /** Current reservations by owner. */
   get entries(): readonly Pick<Reservation, 'label' | 'bytes'>[] {
     return [...this.#held].map(({ label, bytes }) => ({ label, bytes }));
   }
@@ -55,9 +55,10 @@ export class MemoryLedger {
   }
 
   /**
-   * Sets bytes aside before they are allocated: a device that runs out of memory may be lost, and the page with it.
-   * @param most bytes that this reservation may take, besides what is left; default no limit
-   * @throws GaussianSplatError `out-of-memory/budget` if it is more than that, or more than the budget leaves.
+   * Reserves bytes before they are allocated, because a device that runs out of memory may be lost, and the page with
+   * it.
+   * @param most Upper limit of this reservation, besides the rest of the budget; default no limit.
+   * @throws GaussianSplatError `out-of-memory/budget` if either limit is exceeded.
    */
   reserve(label: string, bytes: number, most = Infinity): Reservation {
     if (!(bytes >= 0))

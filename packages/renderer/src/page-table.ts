@@ -13,22 +13,22 @@ import { cameraValues, MAX_FLOAT32 } from './view.js';
 import type { Placement, World } from './world.js';
 import { SH_PRECISION } from './pack/words.js';
 
-/** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
+/** Stride of the uniforms of blocks in bytes: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
 
-/** Stands for a crop that leaves nothing out. */
+/** A crop that contains everything. */
 const EVERYWHERE = {
   min: [-MAX_FLOAT32, -MAX_FLOAT32, -MAX_FLOAT32],
   max: [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32],
 } as const;
 
-/** Optical depth of an opaque surface: the trainer stops painting at this transmittance. */
+/** Optical depth of an opaque surface: trainers stop blending at this transmittance. */
 const OPAQUE_DEPTH = -Math.log(1e-4);
 
-/** Factor of optical depths with which an opaque surface has a given opacity, as CSS understands it. */
+/** Factor of optical depths that gives an opaque surface the specified opacity, as in CSS. */
 export const opticalFactor = (opacity: number): number => Math.min(1, -Math.log(1 - opacity) / OPAQUE_DEPTH);
 
-/** The pages of the visible scenes of a world, with a `View` uniform for each. */
+/** The blocks of the visible scenes of a world, with a `View` uniform for each. */
 export class PageTable {
   #pages: readonly GaussianPage[] = [];
   #firstGroups: Uint32Array = new Uint32Array(1);
@@ -49,7 +49,10 @@ export class PageTable {
     this.lay();
   }
 
-  /** Lays out the pages of the scenes that are visible by now. Whatever was bound to a page must be bound again; memory is kept where it suffices. */
+  /**
+   * Lays out the blocks of the visible scenes. All bindings to blocks must be recreated; memory is reused if it is
+   * large enough.
+   */
   lay(): void {
     const { layout, placements } = this.#world;
     this.#layout = layout;
@@ -69,34 +72,34 @@ export class PageTable {
     return this.#pages;
   }
 
-  /** First group (chunk) of each page, and behind the last the number of all groups. */
+  /** First group (chunk) of each block, followed by the total number of groups. */
   get firstGroups(): Uint32Array {
     return this.#firstGroups;
   }
 
-  /** Groups of all pages. */
+  /** Number of groups over all blocks. */
   get groups(): number {
     return this.firstGroups[this.pages.length];
   }
 
-  /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
+  /** Page requests of the scene of a block, if it is streamed. */
   requestsOf(page: number): PageRequests | undefined {
     return this.#placementOf[page].scene.pageRequests;
   }
 
-  /** What is bound besides where splats are modified. */
+  /** Extra resources of blocks with modified splats. */
   modifiersOf(page: number): Readonly<Record<string, GPUBuffer>> {
     const { modifier } = this.#placementOf[page];
     return modifier ? { modifiers: modifier.values } : {};
   }
 
-  /** The shaders that read a page; undefined for those of `PackedGaussian`. */
+  /** Shaders that read a block; undefined for those of `PackedGaussian`. */
   readingOf(page: number): GeometryReading | undefined {
     const { reading } = this.pages[page];
     return this.#placementOf[page].modifier?.reading(reading) ?? reading;
   }
 
-  /** Whose the splat of a number among those of all pages is. */
+  /** The scene, and index in it, of a splat that is given by its index among all blocks. */
   splatAt(stored: number): ProbedSplat {
     const group = Math.floor(stored / constants.CULL_GROUP);
     const page = this.#firstGroups.findIndex((first, i) => first <= group && group < (this.#firstGroups[i + 1] ?? 0));
@@ -107,27 +110,27 @@ export class PageTable {
     return { placement, index: before + stored - constants.CULL_GROUP * this.#firstGroups[page] };
   }
 
-  /** True if a scene is streamed. */
+  /** Whether a scene is streamed. */
   get isStreamed(): boolean {
     return this.#placements.some(({ scene }) => scene.pageRequests !== undefined);
   }
 
-  /** Lets streamed scenes take in what has come. */
+  /** Lets streamed scenes upload received pages. */
   update(): void {
     for (const { scene } of this.#placements) scene.update?.();
   }
 
-  /** What keeps frames within a budget of splats; undefined without levels of detail. */
+  /** The stages that keep frames within a splat budget; undefined without levels of detail. */
   get detailBudget(): DetailBudget | undefined {
     return this.#placements.find(({ scene }) => scene.detailBudget)?.scene.detailBudget;
   }
 
-  /** True if a page has levels of detail. */
+  /** Whether a block has levels of detail. */
   get hasDetail(): boolean {
     return this.pages.some(({ details }) => details !== undefined);
   }
 
-  /** Splats of all pages. */
+  /** Splats over all blocks. */
   get splats(): number {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
@@ -136,21 +139,21 @@ export class PageTable {
     return this.#memory.byteLength;
   }
 
-  /** The `View` of a page. */
+  /** The `View` uniform of a block. */
   view(page: number): GPUBufferBinding {
     return { buffer: this.#uniforms, offset: VIEW_STRIDE * page, size: layouts.View.size };
   }
 
-  /** True while the visible scenes are those that were laid out. */
+  /** Whether the layout matches the visible scenes. */
   get isCurrent(): boolean {
     return this.#layout === this.#world.layout;
   }
 
   /**
-   * Points every page at a camera, for the commands that are submitted next.
-   * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
-   * @param filter in place of those of the scenes
-   * @param mostCovered `View.most_covered`; undefined for no limit
+   * Writes the camera uniforms of all blocks, for subsequent submissions.
+   * @param pixelArea Area of a pixel of the displayed frame, in pixels of the camera.
+   * @param filter Overrides that of the scenes.
+   * @param mostCovered `View.most_covered`; undefined for no limit.
    */
   look(
     camera: Camera,
@@ -171,7 +174,7 @@ export class PageTable {
     let page = 0;
     for (const { scene, sceneToWorld, opacity, crop = EVERYWHERE } of this.#placements) {
       const seen = sceneToWorld ? { ...camera, worldToCamera: multiply(camera.worldToCamera, sceneToWorld) } : camera;
-      // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
+      // The filter is the same at any resolution: in larger pixels it has less variance.
       const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : scene;
       const values = cameraValues(seen, scene.origin, filterVariance * pixelArea);
       const own = {
@@ -198,7 +201,7 @@ export class PageTable {
   }
 }
 
-/** A corner of a crop in float32, from a scene's origin: infinities become numbers. */
+/** A corner of a crop in float32, relative to a scene's origin: infinities become finite numbers. */
 const relative = (corner: Vector3, origin: Vector3): number[] =>
   corner.map((value, axis) => Math.min(MAX_FLOAT32, Math.max(-MAX_FLOAT32, value - origin[axis])));
 

@@ -2,11 +2,11 @@ import type { Placement } from './world.js';
 
 /** A splat of a scene. */
 export interface ProbedSplat {
-  /** Its place in the world; undefined where one scene is drawn alone: with WebGL. */
+  /** Its placement in the world; undefined if a single scene is drawn with WebGL. */
   readonly placement: Placement | undefined;
   /**
-   * Its number among those of its scene, in the order in which they are stored: of a file, `packedOrder` has their rows. Null where a scene has levels of detail, whose
-   * splats stand for several.
+   * Its index in its scene, in storage order: for a file, `packedOrder` maps it to a row. Null for a scene with levels
+   * of detail, whose splats represent several.
    */
   readonly index: number | null;
 }

@@ -1,13 +1,13 @@
-/** In place of an item: there is none. */
+/** Marks the absence of an item. */
 export const NONE = 0xffffffff;
 
-/** Numbered items, each with a rank, the largest rank first: a binary heap (Williams 1964) that is filled in linear time. */
+/** Numbered items with ranks, largest rank first: a binary heap (Williams 1964) that is built in linear time. */
 export class RankedHeap {
   readonly #items: Uint32Array;
   readonly #ranks: Float64Array;
   #count = 0;
 
-  /** @param capacity items that it holds at most */
+  /** @param capacity Maximum number of items. */
   constructor(capacity: number) {
     this.#items = new Uint32Array(capacity);
     this.#ranks = new Float64Array(capacity);
@@ -31,13 +31,13 @@ export class RankedHeap {
     this.#count = 0;
   }
 
-  /** Adds an item without order; {@link order} must follow before {@link pop}. */
+  /** Appends an item without ordering; {@link order} must follow before {@link pop}. */
   add(item: number, rank: number): void {
     this.#items[this.#count] = item;
     this.#ranks[this.#count++] = rank;
   }
 
-  /** Puts all that was added in order. */
+  /** Orders all appended items. */
   order(): void {
     for (let at = (this.#count >> 1) - 1; at >= 0; at--) this.#sink(at);
   }
@@ -51,7 +51,7 @@ export class RankedHeap {
     }
   }
 
-  /** Removes the item of the largest rank and returns it; {@link NONE} if there is none. */
+  /** Removes and returns the item of the largest rank; {@link NONE} if the heap is empty. */
   pop(): number {
     if (this.#count === 0) return NONE;
     const item = this.#items[0];

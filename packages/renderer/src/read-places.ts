@@ -3,23 +3,23 @@ import type { GaussianPage } from './gaussian-scene.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GEOMETRY_WORDS } from './pack/words.js';
 
-/** Runs of 256 splats that are read at most. */
+/** Maximum number of 256-splat runs to read. */
 const MAX_RUNS = 256;
 const { CULL_GROUP } = constants;
 const RUN_BYTES = 4 * GEOMETRY_WORDS * CULL_GROUP;
 
-/** Centres and opacities of splats. */
+/** Centers and opacities of splats. */
 export interface Places {
   readonly count: number;
   /** [N, 3] relative to the origin of the scene */
   readonly positions: Float32Array;
   /** [N] */
   readonly opacities: Float32Array;
-  /** Rows of the sample with numbers that cannot be drawn: the shader that packs rows leaves zeros in their place. */
+  /** Rows of the sample with unusable numbers, which the packing shader replaced by zeros. */
   readonly unusable: number;
 }
 
-/** Reads runs of splats that are evenly spread over the pages back from the GPU; splats of opacity 0 are left out. */
+/** Reads evenly spaced runs of splats over the blocks back from the GPU; splats of opacity 0 are skipped. */
 export async function readPlaces(device: GPUDevice, pages: readonly GaussianPage[]): Promise<Places> {
   const runs = pages.flatMap(({ geometry, count }) =>
     Array.from({ length: Math.ceil(count / CULL_GROUP) }, (_, run) => ({
@@ -75,7 +75,7 @@ function visiblePlaces(words: Uint32Array): Places {
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
-/** As `unpack_gaussian` of shaders/shared/packed_gaussian.wgsl puts it together. */
+/** Same decoding as `unpack_gaussian` of shaders/shared/packed_gaussian.wgsl. */
 function opacityOf(words: Uint32Array, at: number): number {
   bits[0] = (words[at + 5] << 24) | ((words[at + 6] & 0x3ff) << 14) | ((words[at + 7] & 0x3ff) << 4);
   return float[0];

@@ -2,66 +2,68 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 import type { Threads } from './stages/stage.js';
 
-/**
- * Everything that trades accuracy for speed, one setting each. docs/frontier has what each costs and saves.
- */
+/** Settings that trade accuracy for speed. docs/frontier shows the cost and the saving of each. */
 export interface RenderSettings {
   /**
-   * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
-   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link autotune}.
+   * Rasterizer: `quads` uses hardware rasterization and blending, `tiles` uses compute shaders, front to back in
+   * float32, which stop when nothing behind is visible. `auto`: see {@link autotune}.
    */
   readonly rasterizer: 'auto' | RasterizerName;
-  /** How stages share their work; the image is the same. `auto`: see {@link autotune}. */
+  /** Workgroup variant of the stages; the image is the same. `auto`: see {@link autotune}. */
   readonly threads: 'auto' | Threads;
   /**
-   * Precision in which quads are blended and images kept. `auto`: see {@link autotune}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
-   * feature `float32-blendable`.
+   * Precision of blending quads and of storing images. `auto`: see {@link autotune}. `rgba32float` takes twice the
+   * memory and bandwidth, and quads then need the feature `float32-blendable`.
    */
   readonly accumulation: 'auto' | AccumulationFormat;
   /**
-   * Bits of the keys that splats are sorted by. 32 are those of the float32 depth and sort exactly; fewer
-   * are spread over the logarithm of the visible depths.
+   * Bits of the sort keys. 32 are those of the float32 depth and sort exactly; fewer are distributed over the logarithm
+   * of the visible depth range.
    */
   readonly depthKeyBits: 16 | 24 | 32;
   /**
-   * Submissions that the painting of a frame is divided into, at least: the image is the same, but none runs as long, which matters where drivers stop what takes
-   * them too long. Frames of tiles that may have much to do are divided further without being asked. 1 to 256.
+   * Lower limit of the submissions into which the rasterization of a frame is divided. The image is the same, but each
+   * one is shorter, because some drivers stop long ones. Expensive frames of tiles are divided further automatically. 1
+   * to 256.
    */
   readonly submissions: number;
   /**
-   * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
+   * Transmittance that ends a pixel of tiles. Up to 1e-4, as in training: before the splat that would reduce it to this
+   * value or less. Above: after that splat.
    */
   readonly transmittanceMin: number;
   /**
-   * What splats are ordered by: `center`, the depth of their centres, as most scenes are trained; `distance`, that of their centres from the eye, which turning the
-   * camera does not change (frames with other depths take `center`); or `pixel`, at each pixel where along its ray a splat is
-   * densest. That does not pop when the camera turns, is what scenes of StopThePop and its successors are trained with, and takes the rasterizer `tiles`.
-   * Its code is loaded with the first frame that asks for it: until then splats are ordered by `center`.
+   * Sort order of splats. `center`: depth of their centers, as most scenes are trained. `distance`: distance of their
+   * centers from the eye, which does not change when the camera rotates (frames with mesh depth use `center`). `pixel`:
+   * for each pixel the densest depth along its ray. It does not pop when the camera rotates, matches scenes of
+   * StopThePop and its successors, and requires the rasterizer `tiles`. Its code is loaded with the first frame that
+   * requests it: until then splats are sorted by `center`.
    */
   readonly order: 'center' | 'pixel' | 'distance';
-  /** With `order: 'pixel'`: splats of a pixel that are sorted at once. One that is listed later than that is blended late. */
+  /**
+   * For `order: 'pixel'`: size of the sorted window of a pixel. A splat that is listed later than that is blended late.
+   */
   readonly orderWindow: 16 | 32;
-  /** Spherical harmonics above this degree are ignored. */
+  /** Maximum degree of spherical harmonics; higher ones are ignored. */
   readonly shDegree: 0 | 1 | 2 | 3;
   /**
-   * Scenes with levels of detail (`packWithDetail`, streamed scenes): pixels by which nearly all that is drawn (two standard deviations) may be displaced for
-   * having been merged, before finer splats are drawn instead. 0, the default, draws the finest there are. 0 to 64.
+   * Scenes with levels of detail (`packWithDetail`, streamed scenes): allowed displacement in pixels, which nearly all
+   * merged splats (two standard deviations) keep, before finer splats are drawn. 0, the default, draws the finest
+   * level. 0 to 64.
    */
   readonly detail: number;
-  /** Octaves of distance over which one level of detail fades into the next; with 0 they pop. 0 to 2. */
+  /** Octaves of distance over which one level of detail fades into the next; 0 switches abruptly. 0 to 2. */
   readonly detailFade: number;
-  /**
-   * Scenes with levels of detail: most splats that a frame looks at; `detail` grows as far as that takes. 0 for no limit.
-   */
+  /** Scenes with levels of detail: upper limit of the splats in a frame; `lodError` grows as required. 0 for no limit. */
   readonly splatBudget: number;
-  /** Share of the target's width and height that is really drawn; the rest is interpolated. Above 0, at most 1. */
+  /** Fraction of the target's width and height that is rendered; the result is upsampled. Above 0, at most 1. */
   readonly resolutionScale: number;
 }
 
-/** The threshold of the trainers: INRIA's, gsplat's. */
+/** Threshold of the trainers: INRIA's and gsplat's. */
 export const TRAINED_TRANSMITTANCE = 1e-4;
 
-/** The settings that leave nothing out: what scenes were trained with. */
+/** The exact settings, as in training. */
 const EXACT: RenderSettings = {
   rasterizer: 'auto',
   threads: 'auto',
@@ -80,12 +82,14 @@ const EXACT: RenderSettings = {
 
 type SomeSettings = Partial<RenderSettings> & { readonly quality?: Quality };
 
-/** A named mix of settings: see {@link QUALITIES}. */
+/** A named set of settings: see {@link QUALITIES}. */
 export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
 
 /**
- * What each quality means. The figures are the least PSNR against the float64 reference image that each is held to, on scenes of any kind (captured, opaque, faint, thin; `npm test -- qualities`):
- * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB; captured scenes keep 50 and 44 dB with the last two.
+ * Settings of each quality. The figures are the minimum PSNR against the float64 reference image that tests enforce on
+ * scenes of any kind (captured, opaque, faint, thin; `npm test -- qualities`): `reference` 75 dB, `default` 59 dB (no
+ * error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB; captured scenes keep 50 and 44 dB with the
+ * last two.
  */
 export const QUALITIES: Readonly<Record<Quality, RenderSettings>> = {
   reference: {
@@ -106,9 +110,7 @@ export const QUALITIES: Readonly<Record<Quality, RenderSettings>> = {
   },
 };
 
-/**
- * The settings that frames may set otherwise than those before and behind them at no cost. The others decide what a viewpoint allocates.
- */
+/** Settings that may differ from frame to frame at no cost. The others determine the allocations of a viewpoint. */
 export type PerFrameSettings = Pick<
   RenderSettings,
   'depthKeyBits' | 'transmittanceMin' | 'order' | 'orderWindow' | 'shDegree' | 'detail' | 'resolutionScale'
@@ -123,7 +125,7 @@ const RANGES: Readonly<Partial<Record<keyof RenderSettings, readonly [least: num
   resolutionScale: [1 / 64, 1],
 };
 
-/** The values of settings that are no range. */
+/** Values of settings that are not a range. */
 const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>>> = {
   rasterizer: ['auto', 'quads', 'tiles'],
   threads: ['auto', 'parallel', 'serial'],
@@ -134,7 +136,7 @@ const CHOICES: Readonly<Partial<Record<keyof RenderSettings, readonly unknown[]>
   shDegree: [0, 1, 2, 3],
 };
 
-/** The settings of a quality, with those that differ from it. */
+/** Completes partial settings with those of a quality. */
 export function completed(options: SomeSettings): RenderSettings {
   const base = QUALITIES[options.quality ?? 'default'];
   const names = Object.keys(base) as (keyof RenderSettings)[];
@@ -142,8 +144,9 @@ export function completed(options: SomeSettings): RenderSettings {
 }
 
 /**
- * The same, checked.
- * @throws GaussianSplatError `argument/value` for a number out of range, a name that its setting does not know or an unknown quality.
+ * The same, validated.
+ * @throws GaussianSplatError `argument/value` for a number out of range, a value that its setting does not accept or an
+ * unknown quality.
  */
 export function renderSettingsOf(options: SomeSettings): RenderSettings {
   const quality = options.quality ?? 'default';
@@ -156,7 +159,7 @@ export function renderSettingsOf(options: SomeSettings): RenderSettings {
   return levers;
 }
 
-/** @throws GaussianSplatError `argument/value` for a value that is not in the range of its setting or none of its choices. */
+/** @throws GaussianSplatError `argument/value` for a value that its setting does not accept. */
 export function requireInRange(name: keyof RenderSettings, found: unknown, where = 'FrameSettings'): void {
   const choices = CHOICES[name];
   if (choices && !choices.includes(found)) throw invalid(name, choices.join(', '), found, where);

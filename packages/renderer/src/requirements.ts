@@ -1,11 +1,11 @@
-/** What a renderer asks of its device and of those who call it, and the errors that say so. */
+/** Requirements of a renderer on its device and its callers, and the errors for them. */
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { FrameSettings, FrameTarget } from './frame-target.js';
 import { TEXTURE_USAGE } from './gpu/kernel.js';
 import type { RenderSettings } from './render-settings.js';
 import type { AccumulationFormat } from './rasterizers/rasterizer.js';
 
-/** Optional features that the renderer uses where they exist; it works without any. */
+/** Optional features that the renderer uses if available; it works without any. */
 const USEFUL_FEATURES: readonly GPUFeatureName[] = [
   'float32-blendable',
   'bgra8unorm-storage',
@@ -13,10 +13,13 @@ const USEFUL_FEATURES: readonly GPUFeatureName[] = [
   'timestamp-query',
 ];
 
-/** Limits that decide how large a scene may be. */
+/** Limits that determine the maximum size of a scene. */
 const SIZE_LIMITS = ['maxBufferSize', 'maxStorageBufferBindingSize'] as const;
 
-/** The device to ask an adapter for: its own size limits, and the optional features that the renderer can use. */
+/**
+ * Returns a descriptor for requesting a device: the adapter's own size limits, and the optional features that the
+ * renderer can use.
+ */
 export function deviceDescriptor(adapter: GPUAdapter): GPUDeviceDescriptor {
   return {
     label: 'gaussian-splat',
@@ -36,15 +39,16 @@ export function requireTextureSize(device: GPUDevice, { width, height }: Camera)
   });
 }
 
-/** What a target's texture must be, by the property that says it. */
+/** Required properties of a target's texture. */
 const TARGET: readonly (readonly [property: keyof GPUTexture, expected: unknown])[] = [
   ['sampleCount', 1],
   ['dimension', '2d'],
 ];
 
 /**
- * @param target texture to draw into; of a view nothing is known but the format
- * @throws GaussianSplatError `argument/value` for one that cannot be drawn into, or of another size than the camera's image
+ * @param target Texture to draw into; of a view only the format is known.
+ * @throws GaussianSplatError `argument/value` for a texture that cannot be drawn into, or of another size than the
+ * camera's image.
  */
 export function requireTarget(target: GPUTexture | undefined, format: string, { width, height }: Camera): void {
   if (/depth|stencil|[us]int|snorm$|^(bc|etc|eac|astc)/.test(format))
@@ -84,7 +88,7 @@ export function requireBlendable(device: GPUDevice, format: AccumulationFormat):
   });
 }
 
-/** Of a picture what types alone would say. @throws GaussianSplatError `argument/value` */
+/** Checks the types of a frame target. @throws GaussianSplatError `argument/value` */
 export function requireFrameTarget({ target, over, colours }: Partial<FrameTarget>, settings: FrameSettings): void {
   if (!isObject(target)) throw missing('target', 'a texture, or { view, format } of one', target);
   if (!('createView' in target) && (typeof target.format !== 'string' || !isObject(target.view)))

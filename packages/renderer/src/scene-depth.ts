@@ -8,31 +8,39 @@ import type { AuxiliaryOutputs, PaintingDepth, QuadsWithDepth, RasterizerName } 
 import { rasterizeKernel } from './rasterizers/tile-kernels.js';
 import { BoundImages, type TilePainter } from './rasterizers/tile-painter.js';
 
-/** Depth that a host has drawn, for splats to be hidden by. */
+/** Depth buffer of a host, which hides splats. */
 export interface HostDepth extends DepthPlanes {
-  /** Of the formats `depth32float`, `depth24plus`, `depth16unorm`, with or without stencil, or `r32float`; one sample; usage TEXTURE_BINDING; of any size: the image lies on all of it. */
+  /**
+   * Formats: `depth32float`, `depth24plus`, `depth16unorm`, with or without stencil, or `r32float`; one sample; usage
+   * TEXTURE_BINDING; of any size: it is stretched over the image.
+   */
   readonly texture: GPUTexture;
   /**
-   * What the values are. `device`: 0 at the near plane and 1 at the far one, as GPUs write. `linear`: world units along the camera's axis, 0 where
-   * there is nothing. Default: `linear` for `r32float`, else `device`.
+   * Meaning of the values. `device`: 0 at the near plane and 1 at the far one, as GPUs write. `linear`: world units
+   * along the optical axis, 0 for no depth. Default: `linear` for `r32float`, else `device`.
    */
   readonly values?: 'device' | 'linear' | undefined;
   /**
-   * What is there: a layer among the splats, blended where its depth is passed, in place of a depth at which pixels just end. Premultiplied, in the encoded colors of splats;
-   * alpha is the share of the pixel that it covers, so that antialiased edges show the splats behind. As large as {@link texture}, usage TEXTURE_BINDING.
+   * A layer of color at this depth, blended among the splats; without it pixels end at the depth. Premultiplied, in the
+   * encoded colors of splats; alpha is the covered fraction of the pixel, so that antialiased edges show the splats
+   * behind. Same size as {@link texture}, usage TEXTURE_BINDING.
    */
   readonly color?: GPUTexture | undefined;
-  /** A second layer, before or behind the first, pixel by pixel: what is transparent. Of the same kind and size as the first. */
+  /**
+   * A second layer for transparent surfaces, in front of or behind the first at each pixel. Same kind and size as the
+   * first.
+   */
   readonly second?: { readonly texture: GPUTexture; readonly color: GPUTexture } | undefined;
 }
 
-/** What a frame has to do with depth: at least one of the two. */
+/** Depth input and output of a frame: at least one of the two. */
 export interface SceneDepthOptions {
-  /** What else is in the frame: a pixel of splats ends there. */
+  /** Depth of meshes in the frame, which ends pixels of splats. */
   readonly host?: HostDepth | undefined;
   /**
-   * Receives the median depth of the splats: where half of the light is gone, in world units along the camera's axis; 0 where more passes. Of the target's size, format
-   * `r32float`, usage STORAGE_BINDING. Asks for the rasterizer `tiles`.
+   * Receives the median depth of the splats, which halves the transmittance, in world units along the optical axis; 0
+   * if more light passes. Same size as the target, format `r32float`, usage STORAGE_BINDING. Requires the rasterizer
+   * `tiles`.
    */
   readonly out?: GPUTexture | undefined;
 }
@@ -40,14 +48,15 @@ export interface SceneDepthOptions {
 const FORMATS = /^(depth(32float|24plus|16unorm)(-stencil8)?|r32float)$/;
 
 /**
- * Depth in and out of a frame: give one object for the same textures, and it is bound once.
+ * Depth input and output of a frame: reuse one object for the same textures, so that it is bound once.
  *
  * ```ts
  * const depth = new SceneDepth(device, { host: { texture: depthTexture } });
- * viewpoint.draw(camera, { target, over: 'target', depth });
+ * viewpoint.draw(camera, { target, background: 'load', depth });
  * ```
  *
- * Frames with depth sort their splats by all 32 bits of it, and keep 8 bytes more for each visible splat. Pages without it load nothing of this.
+ * Frames with depth sort their splats by all 32 bits of it, and use 8 more bytes for each visible splat. Pages without
+ * it load none of its code.
  */
 export class SceneDepth implements PaintingDepth {
   readonly #outTexture: GPUTexture | undefined;
@@ -81,7 +90,10 @@ export class SceneDepth implements PaintingDepth {
     this.#uniform = device.createBuffer({ label: 'gs.scene_depth', size: layouts.SceneDepth.size, usage });
   }
 
-  /** @throws GaussianSplatError `unsupported/limits` for median depth of quads; `argument/value` for one of another size, or beside auxiliary outputs. */
+  /**
+   * @throws GaussianSplatError `unsupported/limits` for median depth with quads; `argument/value` for one of another
+   * size, or combined with auxiliary outputs.
+   */
   prepare(
     camera: Camera,
     { width, height }: { readonly width: number; readonly height: number },
@@ -139,7 +151,7 @@ export class SceneDepth implements PaintingDepth {
     });
   }
 
-  /** Frees what little it holds. The textures are the host's. */
+  /** Frees its uniform. The textures belong to the host. */
   destroy(): void {
     this.#uniform.destroy();
   }
@@ -161,7 +173,7 @@ export class SceneDepth implements PaintingDepth {
 const isSame = (a: readonly unknown[] | undefined, b: readonly unknown[]): boolean =>
   a?.length === b.length && a.every((value, k) => value === b[k]);
 
-/** How stored values become camera depths. */
+/** Conversion of stored values to camera depths. */
 function readingOf(host: HostDepth | undefined, camera: Camera): { inverse: number[]; nothing: number } {
   if (host === undefined || valuesOf(host) === 'linear') return { inverse: [1, 0, 0, 1], nothing: 0 };
   return deviceReading(host, camera);
@@ -210,7 +222,7 @@ function requireOut({ format, usage }: GPUTexture): void {
     throw wrong('SceneDepth.out', 'a texture with the usage STORAGE_BINDING', `usage ${usage}`);
 }
 
-/** @param width pixels that are drawn, across */
+/** @param width Width of the drawn image in pixels. */
 function requireRoom(out: GPUTexture, width: number, height: number, rasterizer: RasterizerName): void {
   if (rasterizer !== 'tiles')
     throw new GaussianSplatError('unsupported/limits', {

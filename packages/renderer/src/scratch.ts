@@ -4,11 +4,11 @@ import { GpuMemory } from './gpu/memory.js';
 import type { PageTable } from './page-table.js';
 import { scanBytes } from './stages/stage.js';
 
-/** How much the buffers between the stages must hold. */
+/** Required capacities of the buffers between the stages. */
 export interface ScratchSize {
   /** Splats that may be visible at once. */
   readonly visible: number;
-  /** Cull groups of all pages. */
+  /** Cull groups over all blocks. */
   readonly groups: number;
   readonly pages: number;
 }
@@ -16,22 +16,22 @@ export interface ScratchSize {
 const { size: PLAN_SIZE } = layouts.Plan;
 const { size: PAGE_PLAN_SIZE } = layouts.PagePlan;
 
-/** The buffers that carry a frame from stage to stage. Their size follows the scene, never the camera. */
+/** Buffers between the stages of a frame. Their size depends on the scene, never on the camera. */
 export class Scratch {
-  /** Splats that may be visible at once. Survivors beyond it are not drawn, and counted in `Plan.overflow`. */
+  /** Splats that may be visible at once. Survivors beyond it are not drawn, but counted in `Plan.overflow`. */
   readonly capacity: number;
-  /** Share in which each chunk is drawn, and behind them, in the last word, the pixels of error that a budget asks for. */
+  /** Weight of each chunk, followed by one word for the error threshold of a budget in pixels. */
   chunkShares: GPUBuffer;
-  /** See shaders/shared/detail_counts.wgsl. */
+  /** See shaders/shared/lod_counts.wgsl. */
   readonly detailCounts: GPUBuffer;
   /** One bit for each splat. */
   visibleBits: GPUBuffer;
   /** Survivors of each cull group, then their exclusive prefix sums and the total. */
   groupOffsets: GPUBuffer;
-  /** See shaders/shared/gathered.wgsl. */
+  /** See shaders/shared/cull_stats.wgsl. */
   readonly gathered: GPUBuffer;
   plan: GPUBuffer;
-  /** First group of each page and of the next one, [page][2]. */
+  /** First group of each block and of the next one, [block][2]. */
   pageRanges: GPUBuffer;
   /** PlanLimits of plan.wgsl. */
   readonly limits: GPUBuffer;
@@ -49,7 +49,7 @@ export class Scratch {
   readonly #memory: GpuMemory;
   readonly #kept = new Map<string, GPUBuffer>();
 
-  /** @param spareBytes least size of {@link spare} */
+  /** @param spareBytes Minimum size of {@link spare}. */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
     const memory = new GpuMemory(device);
     this.#device = device;
@@ -84,22 +84,25 @@ export class Scratch {
     }
   }
 
-  /** Depth keys; the sort goes back and forth between the two. The second is one of {@link spare}. */
+  /** Depth keys; the sort alternates between the two. The second is one of {@link spare}. */
   get keys(): readonly [GPUBuffer, GPUBuffer] {
     return [this.#keys, this.#spare[0]];
   }
 
-  /** Slots in the order of their keys, which end in the first. Before the sort that lists the survivors. The second is the other of {@link spare}. */
+  /**
+   * Slots in the order of their keys; the result is in the first. Before the sort it lists the survivors. The second is
+   * the other of {@link spare}.
+   */
   get order(): readonly [GPUBuffer, GPUBuffer] {
     return [this.#order, this.#spare[1]];
   }
 
-  /** Free once splats are in order: the rasterizer's then. */
+  /** Unused after the sort, and then available to the rasterizer. */
   get spare(): readonly [GPUBuffer, GPUBuffer] {
     return this.#spare;
   }
 
-  /** Makes room for other pages; whatever was bound to the buffers for groups and pages must be bound again. */
+  /** Resizes for other blocks; all bindings of the buffers for groups and blocks must be recreated. */
   fitPages(groups: number, pages: number): void {
     const { storage, copyDestination, copySource } = BUFFER_USAGE;
     const grown = (buffer: GPUBuffer, bytes: number): GPUBuffer => {
@@ -115,26 +118,29 @@ export class Scratch {
     this.pageRanges = grown(this.pageRanges, sizes.pageRanges);
   }
 
-  /** Tells the stages which groups belong to which page. */
+  /** Writes the range of groups of each block for the stages. */
   lay({ pages, firstGroups, groups }: Pick<PageTable, 'pages' | 'firstGroups' | 'groups'>): void {
     const ranges = pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]);
     this.#device.queue.writeBuffer(this.pageRanges, 0, Uint32Array.from(ranges));
     this.#device.queue.writeBuffer(this.limits, 0, Uint32Array.of(pages.length, this.capacity, groups));
   }
 
-  /** Makes {@link spare} as large as a rasterizer needs it; whatever was bound to it must be bound again. */
+  /** Resizes {@link spare} for a rasterizer; all its bindings must be recreated. */
   fitSpare(bytes: number): void {
     if (this.#spare[0].size === this.#spareSize(bytes)) return;
     for (const buffer of this.#spare) this.#memory.free(buffer);
     this.#spare = this.#makeSpare(bytes);
   }
 
-  /** Numbers of the visible splats by slot, once {@link keepSurvivors} has been recorded: the sort overwrites what lists them. */
+  /**
+   * Indices of the visible splats by slot, once {@link keepSurvivors} has been recorded, because the sort overwrites
+   * their list.
+   */
   get survivors(): GPUBuffer {
     return this.kept('survivors');
   }
 
-  /** To be recorded between `compact` and the sort. */
+  /** Record it between `compact` and the sort. */
   keepSurvivors(encoder: GPUCommandEncoder): void {
     encoder.copyBufferToBuffer(this.#order, 0, this.survivors, 0, 4 * this.capacity);
   }
@@ -144,12 +150,12 @@ export class Scratch {
     return this.kept('depths');
   }
 
-  /** To be recorded between `project` and the sort, which moves the keys, of a frame whose keys are depths. */
+  /** Record it between `project` and the sort, which moves the keys; the keys of the frame must be depths. */
   keepDepths(encoder: GPUCommandEncoder): void {
     encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
   }
 
-  /** A buffer with `bytes` for each visible splat, made when it is first asked for. */
+  /** A buffer with `bytes` for each visible splat, created at the first request. */
   kept(name: string, bytes = 4): GPUBuffer {
     let buffer = this.#kept.get(name);
     if (buffer === undefined) {
@@ -180,7 +186,7 @@ export class Scratch {
   }
 }
 
-/** Bytes of the buffers whose size follows groups and pages. */
+/** Sizes in bytes of the buffers that depend on groups and blocks. */
 const groupBytes = (groups: number, pages: number) => ({
   chunkShares: 4 * (groups + 1),
   visibleBits: 4 * constants.WORDS_PER_GROUP * groups,
@@ -189,7 +195,7 @@ const groupBytes = (groups: number, pages: number) => ({
   pageRanges: 8 * Math.max(1, pages),
 });
 
-/** Most projected splats that one storage buffer of the device can hold. */
+/** Maximum number of projected splats in one storage buffer of the device. */
 export function maxVisible(device: GPUDevice): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / layouts.ProjectedSplat.size);

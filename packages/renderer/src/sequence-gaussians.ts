@@ -6,15 +6,15 @@ import { type PackedGaussians } from './pack/pack.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
 
 const { CULL_GROUP } = constants;
-/** More room than the first frame needs. */
+/** Factor of the capacity over the first frame. */
 const HEADROOM = 1.25;
 
-/** A number of splats up to whole chunks. */
+/** Rounds a number of splats up to whole chunks. */
 const wholeChunks = (count: number): number => CULL_GROUP * Math.max(1, Math.ceil(count / CULL_GROUP));
 
 /**
- * Gaussians of which the content is replaced, frame by frame, by that of other packed clouds: what is bound to the buffers stays bound, and nothing is
- * allocated as long as there is room.
+ * Gaussians whose content is replaced, frame by frame, by other packed clouds: bindings stay valid, and nothing is
+ * allocated while the frames fit.
  */
 export class SequenceGaussians implements GaussianScene {
   readonly shDegree: ShDegree;
@@ -32,19 +32,19 @@ export class SequenceGaussians implements GaussianScene {
     this.shPrecision = frame.shPrecision;
   }
 
-  /** With the first frame, and room for a quarter more. Rejects as {@link GaussianBuffers.upload} does. */
+  /** Creates it with the first frame, and a quarter more capacity. Rejects as {@link GaussianBuffers.upload} does. */
   static async create(device: GPUDevice, frame: PackedGaussians, options?: UploadOptions): Promise<SequenceGaussians> {
     const room = wholeChunks(HEADROOM * frame.count);
     const buffers = await GaussianBuffers.upload(device, padded(frame, room), options);
     return new SequenceGaussians(device, buffers, frame);
   }
 
-  /** Splats for which there is room. */
+  /** Capacity in splats. */
   get count(): number {
     return this.#buffers.count;
   }
 
-  /** Splats of the frame. */
+  /** Splats of the current frame. */
   get frameCount(): number {
     return this.#frame.count;
   }
@@ -77,12 +77,12 @@ export class SequenceGaussians implements GaussianScene {
     return this.#buffers.byteLength;
   }
 
-  /** True if a frame has room here, and its harmonics are kept in the same way. */
+  /** Whether a frame fits the capacity, and its harmonics have the same layout. */
   fits({ count, shDegree, shPrecision }: PackedGaussians): boolean {
     return count <= this.count && shDegree === this.shDegree && shPrecision === this.shPrecision;
   }
 
-  /** Replaces the content, for the frames that are submitted from now on. The frame must {@link fits}. */
+  /** Replaces the content for subsequent submissions. The frame must satisfy {@link fits}. */
   write(frame: PackedGaussians): void {
     const before = wholeChunks(this.#frame.count);
     this.#frame = frame;
@@ -106,7 +106,10 @@ export class SequenceGaussians implements GaussianScene {
     this.#buffers.destroy();
   }
 
-  /** Items `first` to `last` of an array, into a buffer that begins with the first of them; zeros behind the array's end. */
+  /**
+   * Writes items `first` to `last` of an array into a buffer that starts with the first of them; zeros beyond the end
+   * of the array.
+   */
   #writePart(buffer: GPUBuffer, words: Uint32Array, stride: number, first: number, last: number): void {
     const { queue } = this.#device;
     const end = Math.min(stride * last, words.length);
@@ -117,7 +120,7 @@ export class SequenceGaussians implements GaussianScene {
   }
 }
 
-/** The same with splats behind that no frame shows: opacity 0. */
+/** Pads a frame with invisible splats of opacity 0. */
 function padded(frame: PackedGaussians, count: number): PackedGaussians {
   const stride = shWords(frame.shDegree, frame.shPrecision);
   const geometry = new Uint32Array(GEOMETRY_WORDS * count);

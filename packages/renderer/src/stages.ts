@@ -1,4 +1,4 @@
-/** The stages one by one, for tests and for those who build a pipeline of their own. */
+/** The individual stages, for tests and for custom pipelines. */
 export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
 export { CapacityHistory, type Capacity, type SampledFrame } from './capacity-history.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';

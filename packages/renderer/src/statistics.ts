@@ -4,26 +4,31 @@ import type { Scratch } from './scratch.js';
 
 /** Counts of one frame. */
 export interface FrameStatistics {
-  /** Splats drawn: in front of the camera, opaque enough, and over at least one pixel. */
+  /** Splats drawn: in front of the camera, opaque enough, and covering at least one pixel. */
   readonly visible: number;
-  /** Visible splats that found no room in the renderer's buffers and were left out; the next frames have room. */
+  /**
+   * Visible splats beyond the capacity of the renderer's buffers, which were not drawn; the next frames have enough
+   * capacity.
+   */
   readonly overflow: number;
-  /** Pairs of splat and bin that tiles painted; 0 with quads. */
+  /** Pairs of splat and bin that tiles rasterized; 0 with quads. */
   readonly pairs: number;
-  /** Pairs, of the farthest splats, that found no room and were left out; the next frames have room. */
+  /** Pairs of the farthest splats beyond the capacity, which were not drawn; the next frames have enough capacity. */
   readonly pairOverflow: number;
-  /** Splats on the GPU that were refused because a value was not usable, in the chunks that may be visible. */
+  /** Unusable splats on the GPU, in the chunks that may be visible. */
   readonly unusable: number;
-  /** Pixels by which what is drawn may be displaced so that the frame keeps its `splatBudget`; 0 without one, or with room for all. */
+  /**
+   * Error threshold in pixels that keeps the frame within its `splatBudget`; 0 without a budget, or if all splats fit.
+   */
   readonly budgetError: number;
-  /** How often the visible splats cover the frame: the sum of the shares of its pixels that they take. */
+  /** Total coverage of the frame by the visible splats, as a multiple of its pixels. */
   readonly covered: number;
 }
 
 /**
  * Reads the counts back.
- * @param scratch of the last frame; undefined before there is one
- * @param pairPlan `Plan` of the pairs, with tiles
+ * @param scratch Buffers of the last frame; undefined before the first.
+ * @param pairPlan `Plan` of the pairs, for tiles.
  */
 export async function readStatistics(
   device: GPUDevice,

@@ -2,28 +2,32 @@ import { perDevice } from './gpu/kernel.js';
 import { QueueClock } from './gpu/queue-clock.js';
 
 /**
- * Milliseconds that one submission is meant to keep the GPU. Drivers stop what runs for long (two seconds on Windows) and the device is lost with it:
- * the rest is room for views whose pairs cost more than those of the last look.
+ * Target duration of one submission, ms. Drivers reset the device after long ones (two seconds on Windows); the margin
+ * is for views whose pairs cost more than those of the last measurement.
  */
 const BUDGET_MS = 60;
-/** Milliseconds that a pair of splat and bin is taken to cost on a device of which nothing is known yet: a slow one. */
+/** Assumed milliseconds for a pair of splat and bin on an unmeasured device: a slow one. */
 const UNKNOWN_COST = 0.5e-3;
-/** Pairs under which what a frame takes says little about what a pair costs. */
+/** Below this many pairs, the frame time says little about the cost of a pair. */
 const TELLING_PAIRS = 1 << 16;
-/** Share of the last cost that is believed at least: one look at an easy view, or one hold-up elsewhere, does not decide. */
+/**
+ * Minimum weight of the previous cost, so that one measurement of an easy view, or one unrelated delay, does not
+ * decide.
+ */
 const MEMORY = 0.5;
-/** Submissions beyond which dividing is given up: each costs some time, too. */
+/** Maximum number of submissions, because each has its own cost. */
 const MOST = 256;
 
-/** What painting costs on one device, whichever renderer paints. */
+/** Cost of rasterization on one device, shared by all renderers. */
 class DeviceCost {
-  /** Milliseconds a pair of splat and bin, at the slowest place of the image. */
+  /** Milliseconds for a pair of splat and bin, at the slowest place of the image. */
   perPair = UNKNOWN_COST;
 }
 
 /**
- * Finds into how many submissions the painting of a frame must be divided so that none keeps the GPU for long. The work of a frame is at most the pairs of splat and
- * bin that there is room for: a bound that holds however the camera jumps. What a pair costs is measured at the frames whose counts are read back anyway.
+ * Determines the number of submissions of a frame so that none occupies the GPU for long. The work of a frame is
+ * bounded by the capacity in pairs of splat and bin, even if the camera jumps. The cost of a pair is measured in frames
+ * whose counts are read back anyway.
  */
 export class SubmissionPacer {
   readonly #clock: QueueClock;
@@ -34,17 +38,17 @@ export class SubmissionPacer {
     this.#cost = perDevice(device, 'submission cost', () => new DeviceCost());
   }
 
-  /** Submissions for a frame of at most so many pairs of splat and bin: 1 to 256, and 1 for all that is known to be quick. */
+  /** Number of submissions for a frame with at most this many pairs of splat and bin: 1 to 256, and 1 for fast frames. */
   partsFor(pairs: number): number {
     return Math.min(MOST, Math.max(1, Math.ceil((pairs * this.#cost.perPair) / BUDGET_MS)));
   }
 
-  /** Pairs for which one submission is enough. */
+  /** Maximum number of pairs for a single submission. */
   get pairsAtOnce(): number {
     return Math.floor(BUDGET_MS / this.#cost.perPair);
   }
 
-  /** True if a frame with room for so many pairs may tell what one costs. */
+  /** Whether a frame with this capacity can measure the cost of a pair. */
   wantsToKnow(pairs: number): boolean {
     return pairs * UNKNOWN_COST > BUDGET_MS;
   }
@@ -54,7 +58,7 @@ export class SubmissionPacer {
     return new SubmissionWatch(this.#clock);
   }
 
-  /** Takes note of how many pairs a watched frame has painted. */
+  /** Updates the cost from the pair count of a watched frame. */
   async learn(watch: SubmissionWatch, pairs: Promise<number | undefined>): Promise<void> {
     const [times, painted] = [await watch.painting(), await pairs];
     if (times.length === 0 || painted === undefined || painted < TELLING_PAIRS) return;
@@ -63,7 +67,7 @@ export class SubmissionPacer {
   }
 }
 
-/** When the submissions of one frame were done. Nothing waits for it. */
+/** Completion times of the submissions of one frame, measured asynchronously. */
 export class SubmissionWatch {
   readonly #clock: QueueClock;
   readonly #submitted: number[] = [];
@@ -71,7 +75,7 @@ export class SubmissionWatch {
 
   constructor(clock: QueueClock) {
     this.#clock = clock;
-    // What was handed over before this frame.
+    // Work submitted before this frame.
     this.note();
   }
 
@@ -82,8 +86,8 @@ export class SubmissionWatch {
   }
 
   /**
-   * Milliseconds of each submission that paints: all but the first, or that one where it is the only one, with what comes before the painting. None where the device
-   * was lost meanwhile.
+   * Milliseconds of each submission that rasterizes: all but the first, or the only one including the earlier stages.
+   * Empty if the device was lost meanwhile.
    */
   async painting(): Promise<number[]> {
     const done = await Promise.all(this.#done).catch(() => []);

@@ -18,18 +18,18 @@ const BINDINGS = {
 type Binding = keyof typeof BINDINGS;
 const BINDING_NAMES = Object.keys(BINDINGS) as Binding[];
 
-/** Rows of a tensor that belong to a page. */
+/** Rows of a tensor that belong to a block. */
 interface RowRange {
   readonly first: number;
   readonly count: number;
 }
 
-/** Finds the parts of a generator's tensors that the bindings of `ingest` take. */
+/** Finds the regions of a generator's tensors for the bindings of `ingest`. */
 export class TensorPlaces {
   readonly #layout: GaussianLayout;
   readonly #elementBytes: number;
   readonly #slices: Readonly<Record<Binding, AttributeSlice | undefined>>;
-  /** Stands where there is no tensor. */
+  /** Placeholder for missing tensors. */
   readonly #nothing: GPUBuffer;
   readonly #numbers = new WeakMap<GPUBuffer, number>();
   #lastNumber = 0;
@@ -41,12 +41,12 @@ export class TensorPlaces {
     this.#nothing = memory.buffer('gs.ingest.nothing', 4, BUFFER_USAGE.storage);
   }
 
-  /** Of the widest tensor. */
+  /** Bytes of a row of the widest tensor. */
   get bytesPerRow(): number {
     return this.#elementBytes * Math.max(...this.#layout.attributes.map(({ rowStride }) => rowStride));
   }
 
-  /** @throws GaussianSplatError `argument/value` unless every tensor is there and large enough. */
+  /** @throws GaussianSplatError `argument/value` unless every tensor is present and large enough. */
   check(tensors: Readonly<Record<string, GPUBuffer>>, rows: number, instance: number): void {
     if (rows === 0) return;
     const all = (instance + 1) * rows;
@@ -58,7 +58,7 @@ export class TensorPlaces {
       requireBytes(this.#layout.count, tensors[this.#layout.count], countBytes(this.#layout) * (instance + 1));
   }
 
-  /** The same text for the same buffers. */
+  /** A key that is equal for the same buffers. */
   keyOf(tensors: Readonly<Record<string, GPUBuffer>>): string {
     let key = '';
     for (const name of BINDING_NAMES) {
@@ -70,8 +70,8 @@ export class TensorPlaces {
   }
 
   /**
-   * What the bindings of a page take. Where a run wrote fewer rows than come before the page there is nothing.
-   * @param before rows of other scenes in the same tensors, before the first of this one.
+   * Resources for the bindings of a block; the placeholder if the run wrote no rows for it.
+   * @param before Rows of other scenes in the same tensors, in front of the first of this one.
    */
   resources(
     tensors: Readonly<Record<string, GPUBuffer>>,
@@ -109,16 +109,16 @@ export class TensorPlaces {
 /** Bytes of a live count; int64 has its lower half first. */
 export const countBytes = ({ countDtype }: GaussianLayout): number => (countDtype === 'int64' ? 8 : 4);
 
-/** Bindings begin at multiples of this many bytes: the largest that a device may ask for. */
+/** Alignment of bindings in bytes: the largest that a device may require. */
 const ALIGNMENT = 256;
 
-/** Where a binding begins so that a byte is in it, and how many bytes of it come before that one. */
+/** Aligned offset of a binding that contains a byte, and the number of bytes in front of it. */
 function placeOf(byte: number): { readonly offset: number; readonly skipped: number } {
   const offset = Math.floor(byte / ALIGNMENT) * ALIGNMENT;
   return { offset, skipped: byte - offset };
 }
 
-/** `Ingest` of a page, before any run. @param before rows of other scenes before the first of this one */
+/** `Ingest` of a block, before any run. @param before Rows of other scenes in front of the first of this one. */
 export function ingestValues(
   layout: GaussianLayout,
   first: number,

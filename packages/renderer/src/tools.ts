@@ -1,4 +1,7 @@
-/** Packing, levels of detail, LOD pages and timers, one by one: for tools, and for packages that build on the renderer. */
+/**
+ * Packing, levels of detail, LOD pages and timers as individual functions: for tools, and for packages that build on
+ * the renderer.
+ */
 export { constants } from './generated/shaders.js';
 export { levelsAbove } from './levels/build-levels.js';
 export {

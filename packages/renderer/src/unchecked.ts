@@ -1,4 +1,4 @@
-/** In place of `checks.ts`: for those who make all arguments of a viewpoint themselves. */
+/** Replaces `checks.ts` for callers that construct all arguments of a viewpoint themselves. */
 export { completed as settingsOf } from './render-settings.js';
 
 export const checkArguments = (): void => undefined;

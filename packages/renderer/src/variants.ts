@@ -3,36 +3,36 @@ import type { RenderSettings } from './render-settings.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 import type { Threads } from './stages/stage.js';
 
-/** What a renderer leaves to the device: all of them draw the same image, at different speeds. */
+/** Settings that autotuning selects for a device: all of them draw the same image, at different speeds. */
 export interface Variants {
   readonly rasterizer: RasterizerName;
   readonly accumulation: AccumulationFormat;
   readonly threads: Threads;
 }
 
-/** What works everywhere. */
+/** Variants that work everywhere. */
 export const SAFE: Variants = {
   rasterizer: 'quads',
   accumulation: 'rgba16float',
   threads: 'parallel',
 };
-/** What is likely to suit a GPU. */
+/** Variants that most GPUs prefer. */
 export const LIKELY: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
 
-/** Variants known to suit a device, set by `autotune`. */
+/** Variants of a device, set by `autotune`. */
 const known = (device: GPUDevice): { variants: Variants } => perDevice(device, 'variants', () => ({ variants: SAFE }));
 
 export function remember(device: GPUDevice, variants: Variants): void {
   known(device).variants = variants;
 }
 
-/** What is known to suit a device by now. */
+/** The current variants of a device. */
 export const variantsOf = (device: GPUDevice): Variants => known(device).variants;
 
-/** Sentences on what the self-test found wrong on a device, whose variants are not used; empty for a WebGL context. */
+/** Messages about failed self-tests of a device's variants, which are then not used; empty for a WebGL context. */
 export const faultsOf = (device: object): string[] => perDevice(device, 'faults', () => []);
 
-/** Settings with every `auto` replaced by what suits the device. */
+/** Replaces every `auto` of the settings by the device's variant. */
 export function settle(variants: Variants, levers: RenderSettings): RenderSettings & Variants {
   const own = levers.order === 'pixel' ? 'tiles' : variants.rasterizer;
   const rasterizer = levers.rasterizer === 'auto' ? own : levers.rasterizer;

@@ -2,13 +2,13 @@ import { eyeOf, inverse, multiply, normalize, subtract, type Camera, type Vector
 import { constants, type layouts } from './generated/shaders.js';
 import type { StructValues } from './gpu/struct.js';
 
-/** Part of the half field of view that the Jacobian's clamp allows beyond the image: INRIA's 1.3 is 1 + this. */
+/** Excess of the Jacobian's clamp over the image, as a fraction of the half field of view: INRIA's 1.3 is 1 + this. */
 const CLAMP_MARGIN = 0.3;
 
-/** WGSL lets compilers assume that there is no infinity: a far plane at infinity is as far as float32 goes. */
+/** WGSL allows compilers to assume that there is no infinity: an infinite far plane becomes the largest float32. */
 export const MAX_FLOAT32 = 3.4028234663852886e38;
 
-/** Splats may cover the image as often as they do. */
+/** No limit of the coverage. */
 const NO_LIMIT = 0xffffffff;
 
 type ViewValues = StructValues<typeof layouts.View>;
@@ -34,16 +34,17 @@ export type CameraValues = Omit<
 >;
 
 /**
- * A camera as the shaders want it. The origin is folded into the matrix in float64, so that scenes a million units from
+ * Converts a camera to uniforms. The origin is folded into the matrix in float64, so that scenes a million units from
  * the world's origin keep their float32 digits.
- * @param variance what the scene's low-pass filter adds, in px²
+ * @param variance Of the scene's low-pass filter, in px².
  */
 export function cameraValues(camera: Camera, origin: Vector3, variance: number = constants.DILATION): CameraValues {
   const { width, height, fx, fy, cx, cy, near, far, worldToCamera, orthographic = false } = camera;
   const toOrigin = [1, 0, 0, origin[0], 0, 1, 0, origin[1], 0, 0, 1, origin[2], 0, 0, 0, 1];
   const rows = multiply(worldToCamera, toOrigin);
   const columns = Array.from({ length: 16 }, (_, i) => rows[4 * (i % 4) + Math.floor(i / 4)]);
-  // gsplat's form of the clamp: asymmetric for an off-centre principal point, INRIA's ±1.3 tan(fov/2) for a centred one.
+  // gsplat's form of the clamp: asymmetric for an off-center principal point, INRIA's ±1.3 tan(fov/2) for a centered
+  // one.
   const marginX = (CLAMP_MARGIN * 0.5 * width) / fx;
   const marginY = (CLAMP_MARGIN * 0.5 * height) / fy;
   const eye = subtract(eyeOf(worldToCamera), origin);
@@ -66,13 +67,13 @@ export function cameraValues(camera: Camera, origin: Vector3, variance: number =
   };
 }
 
-/** Along which a camera measures depth, in the coordinates that its matrix takes. */
+/** Direction of a camera's depth, in the coordinates that its matrix transforms. */
 function axisOf(worldToCamera: Camera['worldToCamera']): Vector3 {
   const m = inverse(worldToCamera);
   return normalize([m[2], m[6], m[10]]);
 }
 
-/** A bound of how much longer the matrix can make a vector: the square root of the largest row sum of |W Wᵀ|. */
+/** Upper bound of the matrix's factor on the length of a vector: the square root of the largest row sum of |W Wᵀ|. */
 function stretchOf(worldToCamera: ArrayLike<number>): number {
   const dot = (a: number, b: number): number =>
     worldToCamera[4 * a] * worldToCamera[4 * b] +

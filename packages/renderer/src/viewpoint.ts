@@ -31,39 +31,40 @@ export interface View {
   readonly picture: FrameTarget;
 }
 
-/** In how many parts the painting of a frame is handed over, and who times them. */
+/** Number of submissions of a frame, and the watch that times them. */
 interface Submissions {
   readonly parts: number;
   readonly watch?: SubmissionWatch;
 }
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
-/** Of a target: a view of more than that is none to draw into. */
+/** View of a target: a render attachment has one level and one layer. */
 const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
 
 /** Options of a {@link Viewpoint}. */
 export interface ViewpointOptions {
-  /** Settings of frames that are given none. They decide what is allocated. */
+  /** Default settings of frames. They determine the allocations. */
   readonly settings?: FrameSettings;
   /**
-   * Called when a frame that was drawn lacked splats for want of room in the viewpoint's buffers. The next frame has the room: draw it.
+   * Called when a drawn frame lacked splats because of the capacity of the viewpoint's buffers. The next frame has
+   * enough: draw it.
    */
   readonly onIncomplete?: () => void;
   /**
-   * Whether frames whose splats cover them more than a thousand times, and once more for each 500 splats, are drawn with fewer pixels. Their largest splats are missing until the sum is
-   * known: see `onIncomplete`. Default: false.
+   * Whether to draw fewer pixels if the splats of a frame cover it more than a thousand times, plus once for each 500
+   * splats. Its largest splats are missing until the coverage is known: see `onIncomplete`. Default: false.
    */
   readonly limitsOverdraw?: boolean;
 }
 
 /** A frame that has been encoded. */
 interface Encoded {
-  /** The encoder to go on with. */
+  /** Encoder for the commands that follow. */
   readonly last: GPUCommandEncoder;
-  /** Its counts are to be read. */
+  /** Whether its counts are to be read. */
   readonly isWatched: boolean;
   readonly submissions: Submissions;
-  /** Pages that streamed scenes ask for are to be read. */
+  /** Page requests of streamed scenes that are to be read. */
   readonly requests: readonly PageRequests[];
   readonly resources: Resources;
 }
@@ -78,15 +79,15 @@ interface Encoded {
  * viewpoint.draw(camera, { target: texture });
  * ```
  *
- * Memory is allocated when scenes come, and when the image size or the share of visible splats changes, never while only the camera or a scene moves; no frame
- * waits for a read-back. Each frame sorts the splats that it shows.
+ * Memory is allocated when scenes are added, and when the image size or the fraction of visible splats changes, never
+ * while only the camera or a scene moves; no frame waits for a read-back. Each frame sorts the splats that it shows.
  */
 export class Viewpoint {
   readonly world: World;
   readonly #device: GPUDevice;
-  /** Of settings that have been met. */
+  /** Resolved settings by the settings object. */
   #known = new WeakMap<FrameSettings, RenderSettings & Variants>();
-  /** What `auto` means, until the settings are other ones: no frame changes it. */
+  /** The current variants for `auto`, until the settings change: no frame changes them. */
   #variants: Variants;
   readonly #compose: ComposeStage;
   readonly #pacer: SubmissionPacer;
@@ -99,11 +100,11 @@ export class Viewpoint {
   #settings: FrameSettings;
   #engine: Engine;
   #mostSizes = 1;
-  /** Of the last frame with auxiliary outputs. */
+  /** Auxiliary outputs of the last frame that had any. */
   #auxiliary: AuxiliaryTilePainter | undefined;
-  /** Whether the last frame had to do without the code for its order. */
+  /** Whether the code for the last frame's order was still loading. */
   #lacksOrder = false;
-  /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
+  /** Buffers of the last frame, and its pixels for each pixel of the target; undefined before the first. */
   #last: (ProbeSource & { readonly scale: number }) | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if settings need a feature that the device lacks. */
@@ -126,7 +127,7 @@ export class Viewpoint {
     this.#engine = this.#makeEngine(this.#resolve(settings));
   }
 
-  /** Settings of frames that are given none. */
+  /** Default settings of frames. */
   get settings(): FrameSettings {
     return this.#settings;
   }
@@ -140,7 +141,7 @@ export class Viewpoint {
     this.#useEngine(levers);
   }
 
-  /** The settings that {@link settings} come to on this device; nothing is left `auto`. */
+  /** The {@link settings} with every `auto` resolved for this device. */
   get resolvedSettings(): RenderSettings & Variants {
     return this.#resolve(this.#settings);
   }
@@ -150,24 +151,25 @@ export class Viewpoint {
     return this.#engine.rasterizer.name;
   }
 
-  /** Share of the pixels of each side that frames are drawn with because splats cover them too often, 0..1. */
+  /** Resolution scale of each side that the overdraw limit requires, 0..1. */
   get pixelShare(): number {
     return this.#overdraw?.share ?? 1;
   }
 
-  /** Bytes of GPU memory held between frames, scenes not counted. */
+  /** Bytes of GPU memory allocated between frames, without scenes. */
   get byteLength(): number {
     return this.#memory.byteLength + this.#engine.byteLength;
   }
 
-  /** What the last frame with auxiliary outputs was painted from; undefined before there is one. */
+  /** Rasterization inputs of the last frame with auxiliary outputs; undefined before the first. */
   get auxiliary(): AuxiliaryFrame | undefined {
     return this.#auxiliary?.frame;
   }
 
   /**
-   * Makes what frames with other settings need, so that none of them has to. Their memory, next to nothing, comes with the next frame.
-   * @param targetFormat format of the targets
+   * Compiles the pipelines for other settings, so that no frame has to. Their small amount of memory is allocated with
+   * the next frame.
+   * @param targetFormat Format of the targets.
    * @throws GaussianSplatError `argument/value` for a setting out of range.
    */
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
@@ -183,8 +185,8 @@ export class Viewpoint {
 
   /**
    * Encodes and submits one frame.
-   * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for another argument; `out-of-memory/buffer-limit` if the scenes
-   * need a larger buffer than the device allows.
+   * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for another argument;
+   * `out-of-memory/buffer-limit` if the scenes need a larger buffer than the device allows.
    */
   draw(camera: Camera, picture: FrameTarget, settings: FrameSettings = this.#settings): void {
     const { timer } = picture;
@@ -207,7 +209,7 @@ export class Viewpoint {
   }
 
   /**
-   * Draws several views of the world, such as both eyes or thumbnails: sizes that come again keep their buffers.
+   * Draws several views of the world, such as both eyes or thumbnails: recurring sizes keep their buffers.
    * @throws GaussianSplatError as {@link draw} does.
    */
   drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
@@ -216,9 +218,10 @@ export class Viewpoint {
   }
 
   /**
-   * Records one frame into a host's encoder, between its passes, and submits nothing. The host submits within the same task: what the viewpoint learns of a frame
-   * (how much room it needs, which pages it asks for) it reads in the next one. Record a viewpoint once for each submission: its uniforms are those of
-   * the last frame that was recorded. `submissions` of the settings, and `timer` of the frame, are the host's.
+   * Records one frame into a host's encoder, between its passes, and submits nothing. The host must submit within the
+   * same task, because the next frame reads the counts and page requests of this one. Record a viewpoint once for each
+   * submission: its uniforms are those of the last recorded frame. `submissions` of the settings, and `timer` of the
+   * frame, are ignored.
    * @throws GaussianSplatError as {@link draw} does.
    */
   record(encoder: GPUCommandEncoder, camera: Camera, picture: FrameTarget, settings = this.#settings): void {
@@ -226,7 +229,7 @@ export class Viewpoint {
     if (encoded.isWatched || encoded.requests.length > 0) setTimeout(() => this.#readLater(encoded));
   }
 
-  /** Records a frame. @param mayDivide whether it may be handed over in parts */
+  /** Records a frame. @param mayDivide Whether it may be divided into several submissions. */
   #encode(
     encoder: GPUCommandEncoder,
     camera: Camera,
@@ -242,7 +245,7 @@ export class Viewpoint {
     const target = this.#targetOf(picture, camera);
     const order = this.#orderOf(asked);
     this.#lacksOrder = !order && asked.order === 'pixel';
-    // Sorted exactly, so that a pixel may end at the first splat that is hidden.
+    // Sorted exactly, so that a pixel may end at the first hidden splat.
     const isExact = (depth && !order) || asked.order === 'distance';
     const levers = isExact
       ? { ...asked, depthKeyBits: 32 as const, ...(depth && { order: 'center' as const }) }
@@ -288,14 +291,14 @@ export class Viewpoint {
     monitor.record(encoder, scratch, this.#engine.rasterizer.pairPlan);
   }
 
-  /** Reads the counts of a frame, and judges them. */
+  /** Reads the counts of a frame, and evaluates them. */
   async #read({ monitor, table }: Resources): Promise<FrameCounts | undefined> {
     const counts = await monitor.read();
     if (counts && this.#overdraw?.note(counts.covered / constants.COVERED_UNIT, table.splats)) this.#onIncomplete();
     return counts;
   }
 
-  /** Reads what a frame left that a host has submitted. */
+  /** Reads the counts and requests of a frame that a host has submitted. */
   #readLater({ resources, isWatched, requests }: Encoded): void {
     if (this.#engine.resources.current !== resources) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
@@ -306,25 +309,28 @@ export class Viewpoint {
     for (const request of requests) request.read();
   }
 
-  /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
+  /** Returns the counts of the last frame. Reads back from the GPU: call it for tests and panels, not for every frame. */
   async statistics(): Promise<FrameStatistics> {
     const { readStatistics } = await loadModule('the code for counts', () => import('./statistics.js'));
     const { scratch } = this.#engine.resources.current ?? {};
     return readStatistics(this.#device, scratch, this.#engine.rasterizer.pairPlan);
   }
 
-  /** What orders the splats of a frame pixel by pixel; undefined where nothing does, or not yet: then {@link ViewpointOptions.onIncomplete} says when. */
+  /**
+   * The per-pixel order of a frame; undefined if the frame has none, or it is still loading: {@link
+   * ViewpointOptions.onIncomplete} then follows.
+   */
   #orderOf({ order }: RenderSettings): PixelOrder | undefined {
     if (order !== 'pixel') return undefined;
     const lazy = orderOn(this.#device);
-    // A caller that asks whether the frame is complete gets the error.
+    // Callers of `isComplete` receive the error.
     if (!lazy.now) lazy.load().then(this.#onIncomplete, () => undefined);
     return lazy.now;
   }
 
   /**
-   * Whether the last frame had room, and the code, for all that it should show; if not, the next one will. Reads back from the GPU: for single
-   * images, not for every frame.
+   * Whether the last frame had enough capacity, and all code, for everything that it should show; if not, the next one
+   * will. Reads back from the GPU: call it for single images, not for every frame.
    */
   async isComplete(): Promise<boolean> {
     if (this.#engine.resources.current === undefined) return true;
@@ -339,15 +345,16 @@ export class Viewpoint {
   }
 
   /**
-   * Copies the counts that {@link hadRoom} judges into 16 bytes of a buffer, for those who draw many images before they read anything back.
-   * @param offset bytes, a multiple of 4
+   * Copies the counts that {@link hadRoom} evaluates into 16 bytes of a buffer, for callers that draw many images
+   * before they read anything back.
+   * @param offset Bytes, a multiple of 4.
    */
   copyCounts(encoder: GPUCommandEncoder, buffer: GPUBuffer, offset: number): void {
     const { scratch } = this.#engine.resources.current ?? {};
     if (scratch) copyCounts(encoder, scratch.plan, this.#engine.rasterizer.pairPlan, buffer, offset);
   }
 
-  /** Whether the frame that these four counts are from had room for all that it should show; if not, those that follow will. */
+  /** Whether the frame of these four counts had enough capacity; if not, the following ones will. */
   hadRoom([visible, overflow, pairs, pairOverflow]: Uint32Array): boolean {
     if (overflow + pairOverflow === 0) return true;
     this.#engine.resources.current?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
@@ -355,10 +362,10 @@ export class Viewpoint {
   }
 
   /**
-   * Looks into the last frame at single points of it: how opaque it is there, where its surface lies, what hides a given depth. The same
-   * for all rasterizers. Reads back from the GPU: for clicks and labels, not for every frame. Rejects if the device is lost meanwhile,
-   * and with GaussianSplatError `network/unreachable` if the code for it cannot be loaded.
-   * @returns an answer for each point; none before the first frame.
+   * Probes single points of the last frame: opacity, depth of the surface, and what hides a given depth. Works with all
+   * rasterizers. Reads back from the GPU: call it for clicks and labels, not for every frame. Rejects if the device is
+   * lost meanwhile, and with GaussianSplatError `network/unreachable` if its code cannot be loaded.
+   * @returns An answer for each point; empty before the first frame.
    */
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
     const { probe } = await loadModule('the code that measures depth', () => import('./depth-probe.js'));
@@ -368,7 +375,7 @@ export class Viewpoint {
     return probe(this.#device, { stages, bindings }, drawn);
   }
 
-  /** Frees all GPU memory. Scenes are not touched: they belong to the caller that uploaded them. */
+  /** Frees all GPU memory, except that of scenes, which belong to their creators. */
   destroy(): void {
     this.#engine.destroy();
     this.#last = undefined;
@@ -404,7 +411,7 @@ export class Viewpoint {
     return last;
   }
 
-  /** How this frame is handed over: in one submission, or in as many as keep each short. */
+  /** Number of submissions of this frame: enough to keep each of them short. */
   #submissionsFor(isWatched: boolean): Submissions {
     const least = Math.ceil(this.resolvedSettings.submissions);
     if (this.#engine.rasterizer.pairPlan === undefined) return { parts: least };
@@ -418,7 +425,7 @@ export class Viewpoint {
     watch?.note();
   }
 
-  /** How tiles, or quads, are painted that meet more than splats. */
+  /** Variant of tile or quad rasterization for frames with depth or auxiliary outputs. */
   #wayToPaint(
     { depth, auxiliary }: FrameTarget,
     levers: RenderSettings,
@@ -434,13 +441,13 @@ export class Viewpoint {
     return { painter };
   }
 
-  /** Records the painting, in several submissions where that is asked for. @returns the encoder to go on with */
+  /** Records the rasterization, in several submissions if required. @returns The encoder for the commands that follow. */
   #recordParts(encoder: GPUCommandEncoder, painting: Painting, submissions: Submissions): GPUCommandEncoder {
     const { parts: count } = submissions;
     this.#engine.rasterizer.prepareFrame(encoder, painting);
     let current = encoder;
     for (let index = 0; index < count; index++) {
-      // What comes before the painting is a submission of its own, too.
+      // The stages before the rasterizer are a submission of their own, too.
       if (count > 1) {
         this.#submit(current, submissions);
         current = this.#device.createCommandEncoder({ label: `gs.frame.${index}` });
@@ -450,7 +457,7 @@ export class Viewpoint {
     return current;
   }
 
-  /** The settings that these come to on this device; nothing is left `auto`. */
+  /** Resolves settings for this device, without any `auto`. */
   #resolve(settings: FrameSettings): RenderSettings & Variants {
     const known = this.#known.get(settings);
     if (known) return known;
@@ -459,7 +466,7 @@ export class Viewpoint {
     return made;
   }
 
-  /** What frames of these settings are drawn with: made anew where they ask for another rasterizer. */
+  /** The engine for frames with these settings: created again if they need another rasterizer. */
   #useEngine(levers: RenderSettings & Variants): Engine {
     if (this.#engine.serves(levers)) return this.#engine;
     const engine = this.#makeEngine(levers);
@@ -484,7 +491,7 @@ export class Viewpoint {
     return { view, texture: target, format: target.format, isStorable, width, height };
   }
 
-  /** As large as frames of this target are without settings of their own: one with fewer pixels paints a part of it. */
+  /** Sized for frames of this target at the default settings: a frame with fewer pixels uses a part of it. */
   #accumulationOf(drawn: Camera, target: Target): Accumulation {
     const share = this.resolvedSettings.resolutionScale;
     const width = Math.max(drawn.width, Math.round(target.width * share));
@@ -495,7 +502,10 @@ export class Viewpoint {
   }
 }
 
-/** Whether a frame is drawn as one at rest is: with fewer pixels, or painted less far, it says less of what a frame needs. */
+/**
+ * Whether a frame is drawn with the full settings of rest: one with fewer pixels, or with an earlier stop, says less
+ * about the required capacity.
+ */
 const isWhole = (levers: RenderSettings, base: RenderSettings): boolean =>
   levers.resolutionScale >= base.resolutionScale && levers.transmittanceMin <= base.transmittanceMin;
 

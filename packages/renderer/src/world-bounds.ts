@@ -1,7 +1,10 @@
 import type { Ball, Bounds, Matrix4, Vector3 } from '@gaussian-splat/core';
 import type { Box, Placed, World } from './world.js';
 
-/** Where the visible scenes of a world are, in world units, of those whose bounds are known; undefined where none is. */
+/**
+ * Returns the bounds of the visible scenes of a world, in world units, over those with known bounds; undefined if there
+ * are none.
+ */
 export function boundsOfWorld({ placements }: Pick<World, 'placements'>): Bounds | undefined {
   const all = placements.flatMap((placement) => {
     const { bounds, visible } = placement;
@@ -10,7 +13,7 @@ export function boundsOfWorld({ placements }: Pick<World, 'placements'>): Bounds
   return all.length > 0 ? all.reduce(union) : undefined;
 }
 
-/** Where a point of a scene stands in the world. */
+/** Transforms a point of a scene to the world. */
 function inWorld(m: Matrix4 | undefined, [x, y, z]: Vector3): Vector3 {
   if (m === undefined) return [x, y, z];
   const row = (r: number): number => m[r] * x + m[r + 1] * y + m[r + 2] * z + m[r + 3];
@@ -34,7 +37,7 @@ function placedBounds(bounds: Bounds, { sceneToWorld: m, crop }: Placed): Bounds
   return { min: of(Math.min), max: of(Math.max), ...ball(cropped), ...(subject && { subject: ball(subject) }) };
 }
 
-/** Bounds of what a crop leaves. */
+/** Bounds of a scene after a crop. */
 function cut(bounds: Bounds, crop: Box): Bounds {
   const clamp = (p: Vector3): Vector3 => {
     const at = (axis: number): number => Math.min(crop.max[axis], Math.max(crop.min[axis], p[axis]));
@@ -43,7 +46,7 @@ function cut(bounds: Bounds, crop: Box): Bounds {
   const [min, max] = [clamp(bounds.min), clamp(bounds.max)];
   const reach = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2;
   const { center, radius } = bounds;
-  // The middle of what is left of the ball, so that what is left is framed.
+  // Centers the sphere on the cropped part, so that a camera frames it.
   const middle = (axis: number): number => {
     if (min[axis] === bounds.min[axis] && max[axis] === bounds.max[axis]) return center[axis];
     const from = Math.max(min[axis], Math.min(max[axis], center[axis] - radius));
@@ -65,7 +68,7 @@ function union(a: Bounds, b: Bounds): Bounds {
   return { ...boxes, ...joined(a, b), ...(subject && { subject }) };
 }
 
-/** The least ball around two. */
+/** The smallest sphere around two. */
 function joined(a: Ball, b: Ball): Ball {
   const [dx, dy, dz] = [0, 1, 2].map((axis) => b.center[axis] - a.center[axis]);
   const distance = Math.hypot(dx, dy, dz);

@@ -8,37 +8,42 @@ export interface Box {
   readonly max: Vector3;
 }
 
-/** How a scene stands in a {@link World}. */
+/** Placement of a scene in a {@link World}. */
 export interface Placed {
   readonly scene: GaussianScene;
-  /** Scene to world, row-major 4x4, last row (0, 0, 0, 1), float64: any affine matrix that can be inverted. Default: the identity. */
+  /**
+   * Scene to world, row-major 4x4, last row (0, 0, 0, 1), float64: any invertible affine matrix. Default: the identity.
+   */
   readonly sceneToWorld?: Matrix4 | undefined;
-  /** Opacity of the scene, 0 to 1, as of CSS: that of a surface that is opaque at 1. What lies behind several surfaces is hidden more. Default: 1. */
+  /**
+   * Opacity of the scene, 0 to 1, as in CSS: that of a surface that is opaque at 1. Several surfaces hide more.
+   * Default: 1.
+   */
   readonly opacity?: number | undefined;
-  /** Only splats whose centres lie in this box, in the scene's own frame, are drawn. */
+  /** Only splats whose centers lie in this box, in the scene's own coordinates, are drawn. */
   readonly crop?: Box | undefined;
   /** Default: true. */
   readonly visible?: boolean | undefined;
   /** Cuts, tints, reveals or moves its splats: a `SplatModifier` of `@gaussian-splat/renderer/modifiers`. */
   readonly modifier?: PlacementModifier | undefined;
-  /** Bounds in the scene's own frame, for {@link boundsOfWorld}. */
+  /** Bounds in the scene's own coordinates, for {@link boundsOfWorld}. */
   readonly bounds?: Bounds | undefined;
 }
 
-/** A scene in a {@link World}. What is set here holds from the next frame on. */
+/** A scene in a {@link World}. Changes apply from the next frame on. */
 export class Placement implements Placed {
   readonly scene: GaussianScene;
-  /** @internal Called where a frame of the placement would differ; with true where the list of visible scenes does. */
+  /** @internal Called when a frame of the placement would change; with true if the list of visible scenes changes. */
   readonly #onChange: (ofList: boolean) => void;
   #sceneToWorld: Matrix4 | undefined;
   #opacity = 1;
   #crop: Box | undefined;
   #visible: boolean;
   #modifier: PlacementModifier | undefined;
-  /** Bounds in the scene's own frame, for {@link boundsOfWorld}. */
+  /** Bounds in the scene's own coordinates, for {@link boundsOfWorld}. */
   bounds: Bounds | undefined;
 
-  /** Made by {@link World.add}. */
+  /** Created by {@link World.add}. */
   constructor(placed: Placed, onChange: (ofList: boolean) => void) {
     this.#onChange = () => undefined;
     this.scene = placed.scene;
@@ -52,8 +57,8 @@ export class Placement implements Placed {
   }
 
   /**
-   * Scene to world; undefined where they are the same. The matrix is copied.
-   * @throws GaussianSplatError `argument/value` for one that is not affine, not finite or cannot be inverted.
+   * Scene to world; undefined for the identity. The matrix is copied.
+   * @throws GaussianSplatError `argument/value` for one that is not affine, not finite or not invertible.
    */
   get sceneToWorld(): Matrix4 | undefined {
     return this.#sceneToWorld;
@@ -102,13 +107,13 @@ export class Placement implements Placed {
     this.#onChange(true);
   }
 
-  /** What cuts, tints, reveals or moves its splats; its pipelines must be there, so that no frame makes them. */
+  /** Cuts, tints, reveals or moves its splats; compile its pipelines first, so that no frame has to. */
   get modifier(): PlacementModifier | undefined {
     return this.#modifier;
   }
 
   set modifier(modifier: PlacementModifier | undefined) {
-    // The same one: its values are others.
+    // The same modifier again: only its values have changed.
     const ofList = modifier !== this.#modifier;
     this.#modifier = modifier;
     this.#onChange(ofList);
@@ -116,7 +121,8 @@ export class Placement implements Placed {
 }
 
 /**
- * Scenes that are drawn together: sorted once, so that they hide one another. Any number of {@link Viewpoint}s may draw one world.
+ * Scenes that are drawn together: sorted together, so that they occlude one another. Any number of {@link Viewpoint}s
+ * may draw one world.
  *
  * ```ts
  * const world = new World();
@@ -125,37 +131,37 @@ export class Placement implements Placed {
  * plant.opacity = 0.8;
  * ```
  *
- * A world holds no memory of its own: scenes belong to those who made them, and must live as long as they are in it.
+ * A world holds no memory of its own: scenes belong to their creators, and must outlive their placements.
  */
 export class World {
   #placements: readonly Placement[] = [];
   #layout = 0;
   #changes = 0;
 
-  /** All scenes, visible or not, in the order in which they were added: it decides between equal depths. */
+  /** All scenes, visible or not, in the order of their addition, which decides between equal depths. */
   get placements(): readonly Placement[] {
     return this.#placements;
   }
 
-  /** Grows when scenes are added, removed, shown or hidden. */
+  /** Incremented when scenes are added, removed, shown or hidden. */
   get layout(): number {
     return this.#layout;
   }
 
-  /** Grows when a scene is placed otherwise than before. */
+  /** Incremented when a placement changes. */
   get changes(): number {
     return this.#changes;
   }
 
   /**
-   * Adds a scene. The same scene may stand in several places.
+   * Adds a scene. The same scene may have several placements.
    * @throws GaussianSplatError `argument/value` for a placement out of range.
    */
   add(placed: Placed): Placement {
     if (typeof placed?.scene !== 'object' || !Array.isArray(placed.scene?.pages))
       throw wrong('scene', 'a GaussianScene: GaussianBuffers, DynamicGaussians, …', placed?.scene);
     const placement = new Placement(placed, (ofList) => {
-      // One that was removed changes nothing.
+      // A removed placement changes nothing.
       if (!this.#placements.includes(placement)) return;
       if (ofList) this.#layout++;
       else this.#changes++;
@@ -165,7 +171,7 @@ export class World {
     return placement;
   }
 
-  /** Takes a scene out. Its memory stays: it belongs to its maker. */
+  /** Removes a scene. Its memory belongs to its creator, and stays. */
   remove(placement: Placement): void {
     const left = this.#placements.filter((other) => other !== placement);
     if (left.length === this.#placements.length) return;

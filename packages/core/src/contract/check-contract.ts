@@ -17,9 +17,9 @@ import {
 } from './tensor-rules.js';
 
 /**
- * Holds the header of a file against a contract, before any runtime is loaded: names, shapes, element types, numbers of
- * Gaussians, opsets, operators, external files.
- * @returns every fault; none if the file keeps the contract.
+ * Checks the header of a file against a contract, before any runtime is loaded: names, shapes, element types, numbers
+ * of Gaussians, opsets, operators, external files.
+ * @returns Every fault; empty if the file satisfies the contract.
  */
 export function checkContract(file: OnnxHeader, contract: Contract, options: CheckFileOptions = {}): ContractFault[] {
   const header = oneInstance(file, contract);
@@ -71,7 +71,7 @@ function missingInputs(header: OnnxHeader, { inputs }: Contract): ContractFault[
     );
 }
 
-/** ONNX lets whoever runs a model replace such a default; onnxruntime-web refuses to. */
+/** ONNX allows callers to override such a default, but onnxruntime-web rejects that. */
 const optionalInput = (name: string, role: string): ContractFault => ({
   code: 'contract/missing-tensor',
   tensor: name,
@@ -98,7 +98,7 @@ function missingTensor(
   };
 }
 
-/** Shape and element type of one tensor. */
+/** Checks shape and element type of one tensor. */
 function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): ContractFault[] {
   const faults: ContractFault[] = [];
   const common = { tensor: tensor.name, where };
@@ -135,7 +135,7 @@ function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): Contr
 const CONTROL_DTYPES: TensorRule['dtypes'] = ['float32', 'int32', 'int64'];
 const STATE_DTYPES: TensorRule['dtypes'] = ['float32', 'float16', 'int32'];
 
-/** The output that the next run takes must be as the input is. */
+/** The output that feeds the next run must match the input. */
 function checkState(
   input: OnnxTensor,
   { output }: StateInput,
@@ -154,7 +154,7 @@ function checkState(
   return [{ code: 'contract/shape', tensor: output, where, expected, found, remedy }];
 }
 
-/** The default and both ends of the range of whole numbers are some, and int32 holds them. */
+/** The default and both ends of an integer range must be integers that fit int32. */
 function checkWhole(
   { name, dtype }: OnnxTensor,
   { range, default: initial }: ControlInput,
@@ -175,12 +175,12 @@ function checkWhole(
 }
 
 function checkAnyShape(input: OnnxTensor, where: string, dtypes: TensorRule['dtypes']): ContractFault[] {
-  // The rule asks for the shape that the tensor has, if all its sizes are fixed.
+  // The rule expects the shape of the tensor, if all its sizes are fixed.
   const shape = input.dims?.map((dim) => (typeof dim === 'number' && dim > 0 ? dim : 'size'));
   return checkTensor(input, { shapes: [shape ?? ['any fixed sizes']], dtypes }, where);
 }
 
-/** Defaults and names must be as many as the tensor has elements. */
+/** The number of defaults and of names must match the elements of the tensor. */
 function checkDefault({ name, dims }: OnnxTensor, binding: InputBinding, where: string): ContractFault[] {
   const size = elementCount(dims ?? []);
   const lengths: [field: string, length: number | undefined, expected: number][] = [];
@@ -230,7 +230,7 @@ function checkOutputTensors(header: OnnxHeader, outputs: OutputBinding): Contrac
   });
 }
 
-/** What all tensors of Gaussians must agree on: their number, their element type, the degree of the harmonics. */
+/** Checks the consistency of all tensors of Gaussians: their number, element type, and degree of harmonics. */
 function checkGaussians(header: OnnxHeader, contract: Contract): ContractFault[] {
   const { outputs } = contract;
   const tensors = tensorNames(outputs).flatMap(([field, name]) => {
@@ -247,7 +247,7 @@ interface GaussianOutput extends OnnxTensor {
 }
 
 function checkRows(tensors: readonly GaussianOutput[], { nMax, outputs }: Contract): ContractFault[] {
-  // Rows behind the living ones are padding.
+  // Rows after the live ones are padding.
   const isCounted = outputs.layout !== 'image' && outputs.count !== undefined;
   const faults: ContractFault[] = [];
   const fixed = tensors.filter(({ dims }) => typeof dims[0] === 'number');
@@ -295,7 +295,7 @@ function checkDtypes(tensors: readonly GaussianOutput[], { dtype }: Contract): C
 function checkShDegree(tensors: readonly GaussianOutput[], { outputs, shDegree }: Contract): ContractFault[] {
   const tensor = tensors.find(({ field }) => field === 'sh' || (outputs.layout === 'packed' && field === 'gaussians'));
   if (shDegree === undefined || outputs.layout === 'image') return [];
-  // Plain colours are as good as degree 0.
+  // Plain colors count as degree 0.
   const found = (tensor && shDegreeOf(outputs, tensor.dims)) ?? 0;
   if (found === shDegree || (tensor === undefined && tensorNames(outputs).some(([field]) => field === 'sh'))) return [];
   return [

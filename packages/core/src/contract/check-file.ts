@@ -2,21 +2,21 @@ import type { ExternalFile, OnnxDtype, OnnxHeader } from '../onnx/header.js';
 import { uncastableTypes } from '../onnx/webgpu-provider.js';
 import type { ContractFault } from './contract-error.js';
 
-/** What ONNX Runtime 1.30 reads. */
+/** Versions that ONNX Runtime 1.30 supports. */
 export const RUNTIME_LIMITS = { irVersion: 13, oldestOpset: 7, newestOpset: 26 } as const;
 
-/** Domains of operators that onnxruntime-web has kernels for, besides ONNX's own. */
+/** Operator domains for which onnxruntime-web has kernels, besides ONNX's own. */
 const RUNTIME_DOMAINS = ['com.microsoft', 'ai.onnx.ml'];
 
 export interface CheckFileOptions {
   /**
-   * Sizes in bytes of the files beside the model that are at hand, by the location that the model writes. Leave it out where
-   * this was not checked: missing files are then no fault.
+   * Sizes in bytes of the available external files, by the location in the model. If undefined, missing files are not
+   * reported.
    */
   readonly files?: ReadonlyMap<string, number>;
 }
 
-/** What holds for a file with any contract: versions, operators, external data. */
+/** Checks that do not depend on the contract: versions, operators, external data. */
 export function checkFile(header: OnnxHeader, { files }: CheckFileOptions): ContractFault[] {
   return [
     ...checkVersions(header),
@@ -40,7 +40,7 @@ function checkVersions({ irVersion, opsets, operators }: OnnxHeader): ContractFa
       remedy: 'save the model with an older IR version (model.ir_version in Python)',
     });
   }
-  // A file whose operators are all of other domains need not name it.
+  // A file with operators of other domains only need not declare it.
   const isNeeded = [...operators.keys()].some((name) => !name.includes(':'));
   if (opset === undefined ? isNeeded : opset < oldestOpset || opset > newestOpset) {
     faults.push({
@@ -68,8 +68,8 @@ function checkOperators({ operators, functions }: OnnxHeader): ContractFault[] {
 }
 
 /**
- * PyTorch's own exporter, asked for opset 17, writes reductions of opset 18 into the file, which ONNX Runtime refuses: found here before any
- * runtime is fetched.
+ * PyTorch's own exporter, when asked for opset 17, writes reductions of opset 18 into the file, which ONNX Runtime
+ * rejects: detected here before any runtime is loaded.
  */
 function checkAttributes({ nodes, opsets }: OnnxHeader): ContractFault[] {
   const opset = opsets.get('ai.onnx') ?? Infinity;
@@ -115,7 +115,7 @@ function checkExternalFile({ location, byteLength }: ExternalFile, files: CheckF
     : fault(`at least ${byteLength} bytes`, `${size}`, 'copy the file again; it is incomplete');
 }
 
-/** True for a relative path that stays inside its folder, on any system. */
+/** Whether a relative path stays inside its folder, on any system. */
 export function isInside(location: string): boolean {
   const parts = location.split(/[/\\]/);
   return location !== '' && !/^[a-z][a-z0-9+.-]*:/i.test(location) && parts[0] !== '' && !parts.includes('..');

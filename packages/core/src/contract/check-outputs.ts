@@ -10,23 +10,23 @@ import type { OutputTensor } from './instances.js';
 
 export type { OutputTensor };
 
-/** What {@link checkOutputs} found. */
+/** Result of {@link checkOutputs}. */
 export interface OutputReport {
-  /** Every fault; values of the same kind in one tensor are one fault that names the first row and how many there are. */
+  /** Every fault; values of the same kind in one tensor are one fault that names the first row and their number. */
   readonly faults: readonly ContractFault[];
-  /** Rows that the tensors have. */
+  /** Rows of the tensors. */
   readonly rows: number;
-  /** Rows that live: `count` where it is written, else all. Only these are checked. */
+  /** Live rows: `count` if it is written, else all. Only these are checked. */
   readonly live: number;
-  /** Box of the live, finite centres in world units; undefined if there are none. */
+  /** Box of the live, finite centers in world units; undefined if there are none. */
   readonly bounds: { readonly min: Vector3; readonly max: Vector3 } | undefined;
 }
 
 /**
- * Checks what one run of a generator wrote: shapes, live count, finite numbers, covariances positive semi-definite, scales
- * and opacities in range. A pure function over arrays: it runs in a browser as well as in a shell.
+ * Checks the output of one run of a generator: shapes, live count, finite numbers, covariances positive semi-definite,
+ * scales and opacities in range. A pure function over arrays, which runs in browsers and in Node.
  *
- * @param outputs what the run wrote, by the names of the file's outputs.
+ * @param outputs Outputs of the run, by the names in the file.
  */
 export function checkOutputs(contract: Contract, outputs: Readonly<Record<string, OutputTensor>>): OutputReport {
   const faults = checkShapes(contract, outputs);
@@ -56,14 +56,14 @@ export function checkOutputs(contract: Contract, outputs: Readonly<Record<string
 }
 
 /**
- * Whether the centres that a run wrote lie within the bounds that the contract declares, up to rounding. Bounds speak of all
- * times and views, but of controls, poses and shapes at their defaults: runs with others may leave them.
+ * Whether the centers of a run lie within the bounds that the contract declares, up to rounding. Bounds hold for all
+ * times and views, with default controls, poses and shapes: other runs may exceed them.
  */
 export function checkBounds({ bounds: declared, outputs, dtype }: Contract, { bounds }: OutputReport): ContractFault[] {
   if (!declared || !bounds) return [];
   const extent = Math.max(...declared.max.map((max, axis) => max - declared.min[axis]));
   const farthest = Math.max(...[...declared.min, ...declared.max].map(Math.abs));
-  // Of a single Gaussian, or of a small scene far away, the extent says nothing of the rounding.
+  // For a single Gaussian, or a small scene far away, the extent says nothing about the rounding error.
   const slack = Math.max(1e-3 * extent, farthest * (dtype === 'float16' ? 2 ** -11 : 2 ** -23));
   const isInside = [0, 1, 2].every(
     (axis) => bounds.min[axis] >= declared.min[axis] - slack && bounds.max[axis] <= declared.max[axis] + slack,
@@ -83,7 +83,7 @@ export function checkBounds({ bounds: declared, outputs, dtype }: Contract, { bo
   ];
 }
 
-/** Faults of a second run with the same inputs: every output must hold the same numbers, bit for bit. */
+/** Compares a second run with the same inputs: every output must hold the same numbers, bit for bit. */
 export function compareRuns(
   contract: Contract,
   first: Readonly<Record<string, OutputTensor>>,
@@ -118,17 +118,20 @@ function firstDifference(a: OutputTensor, b: OutputTensor): number {
 
 const columnsOf = (dims: readonly number[]): number => dims.slice(1).reduce((product, dim) => product * dim, 1);
 
-/** Dimensions without ones before them; undefined where they are not those of the rule. No Gaussian at all is an answer; N is otherwise positive. */
+/**
+ * Dimensions without leading ones; undefined if they do not match the rule. Zero Gaussians are valid; otherwise N is
+ * positive.
+ */
 function writtenDims({ dims, data }: OutputTensor, rule: TensorRule): readonly number[] | undefined {
   const isEmpty = data.length === 0 && dims.includes(0);
   const filled = isEmpty ? dims.map((dim) => dim || EMPTY) : dims;
   return (bareDims(filled, rule) as readonly number[] | undefined)?.map((dim) => (isEmpty && dim === EMPTY ? 0 : dim));
 }
 
-/** Stands for no rows, and is no size of anything else. */
+/** Marks zero rows; no other dimension has this size. */
 const EMPTY = 2 ** 31;
 
-/** Presence, shape and row counts of what was written; values can only be read where these are right. */
+/** Checks presence, shape and row counts of the outputs; values can be read only if these are valid. */
 function checkShapes(
   { outputs: binding, nMax }: Contract,
   outputs: Readonly<Record<string, OutputTensor>>,
@@ -171,7 +174,7 @@ function liveRows(
   rows: number,
 ): { live: number; countFaults: ContractFault[] } {
   if (name === undefined) return { live: rows, countFaults: [] };
-  // An int64 comes as a BigInt.
+  // An int64 is a BigInt.
   const count = Number(outputs[name].data[0]);
   if (Number.isInteger(count) && count >= 0 && count <= rows) return { live: count, countFaults: [] };
   const fault: ContractFault = {
@@ -185,7 +188,7 @@ function liveRows(
   return { live: Math.min(Math.max(0, Math.trunc(count) || 0), rows), countFaults: [fault] };
 }
 
-/** Access to one attribute of any row as numbers, whatever the element type. */
+/** Reads one attribute of any row as numbers, for any element type. */
 function readerOf(slice: AttributeSlice, { dtype, data }: OutputTensor): RowReader {
   const isBits = dtype === 'float16' && data instanceof Uint16Array;
   const { offset, rowStride } = slice;
@@ -195,7 +198,7 @@ function readerOf(slice: AttributeSlice, { dtype, data }: OutputTensor): RowRead
   return { ...slice, isHalf: dtype === 'float16', read };
 }
 
-/** Walks all live rows and turns what is wrong into one fault for each kind and tensor. */
+/** Checks all live rows and reports one fault for each kind and tensor. */
 function collectRowFaults(readers: readonly RowReader[], live: number): ContractFault[] {
   const kinds = new Map<string, { fault: RowFault; reader: RowReader; row: number; count: number }>();
   for (const reader of readers) {

@@ -1,16 +1,16 @@
 import { GaussianSplatError, type ContractErrorCode, type ErrorData } from '../errors.js';
 
-/** One thing that is wrong. Fields are phrases without a trailing full stop. */
+/** A single fault. Fields are phrases without a trailing full stop. */
 export interface ContractFault {
   /** Stable code. */
   readonly code: ContractErrorCode;
-  /** Name of the input or output in question; undefined if the fault is not about one. */
+  /** Name of the input or output; undefined if the fault concerns none. */
   readonly tensor?: string;
-  /** Place in the contract or in the file, for readers. */
+  /** Place in the contract or in the file, for display. */
   readonly where: string;
   readonly expected: string;
   readonly found: string;
-  /** What to do. */
+  /** Suggested correction. */
   readonly remedy: string;
 }
 
@@ -18,15 +18,15 @@ export interface ContractErrorData extends ErrorData {
   readonly faults: readonly ContractFault[];
 }
 
-/** Faults that the message of an error spells out; all of them are in its `faults`. */
+/** Maximum number of faults in the message of an error; all of them are in its `faults`. */
 const MESSAGE_FAULTS = 20;
 
-/** Everything that is wrong between a file, its contract and its values. Code and phrases are those of the first fault. */
+/** All faults of a file, its contract or its values. Code and phrases are those of the first fault. */
 export class ContractError extends GaussianSplatError {
   override readonly name = 'ContractError';
   readonly faults: readonly ContractFault[];
 
-  /** @param faults at least one. */
+  /** @param faults At least one. */
   constructor(faults: readonly ContractFault[]) {
     super(faults[0].code, faults[0]);
     this.faults = faults;
@@ -46,7 +46,7 @@ export class ContractError extends GaussianSplatError {
   }
 }
 
-/** A fault as one line. */
+/** Formats a fault as one line. */
 export function describeFault({ code, where, expected, found, remedy }: ContractFault): string {
   return `${where}: expected ${expected}, found ${found}. ${remedy.charAt(0).toUpperCase()}${remedy.slice(1)}. [${code}]`;
 }

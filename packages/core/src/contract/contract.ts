@@ -2,76 +2,83 @@ import type { ShDegree, SplatFilter } from '../gaussian-cloud.js';
 import type { Vector3 } from '../vector.js';
 
 /**
- * A Gaussian Generator contract, version 1: what an ONNX file's inputs mean and how its outputs are written. Published
- * wording, with examples: docs/contract.md; as JSON Schema: contract.schema.json.
+ * A Gaussian Generator contract, version 1: the meaning of an ONNX file's inputs and the layout of its outputs.
+ * Documentation with examples: docs/contract.md; JSON Schema: contract.schema.json.
  */
 export interface Contract {
   /** Address of the JSON Schema, for editors; not read. */
   readonly $schema?: string;
   readonly version: 1;
-  /** Name for readers. */
+  /** Display name. */
   readonly name?: string;
-  /** What each input of the ONNX file means, by its name. A file without inputs has none: `{}`. */
+  /** Meaning of each input of the ONNX file, by its name; `{}` for a file without inputs. */
   readonly inputs: Readonly<Record<string, InputBinding>>;
-  /** Where and how the Gaussians are written. */
+  /** Layout of the Gaussian outputs. */
   readonly outputs: OutputBinding;
-  /** Most Gaussians that one run writes: needed where the file leaves their number N symbolic. With a `count` it may be less than N: rows behind it are padding. */
+  /**
+   * Maximum number of Gaussians in one run: required if the file leaves their number N symbolic. With a `count` it may
+   * be less than N: rows after it are padding.
+   */
   readonly nMax?: number;
-  /** Declared by a model that computes several instances of itself in one run. */
+  /** For a model that computes several instances in one run. */
   readonly instances?: Instances;
-  /** Element type of the Gaussian outputs. The file says it too; declared here it is checked. */
+  /** Element type of the Gaussian outputs. It follows from the file; declare it to have it checked. */
   readonly dtype?: 'float32' | 'float16';
-  /** Degree of the spherical harmonics. The shape says it too; declared here it is checked. */
+  /** Degree of the spherical harmonics. It follows from the shape; declare it to have it checked. */
   readonly shDegree?: ShDegree;
-  /** Box around all centres at all times, in world units, with controls, poses and shapes at their defaults. */
+  /** Box around all centers at all times, in world units, for default controls, poses and shapes. */
   readonly bounds?: { readonly min: Vector3; readonly max: Vector3 };
-  /** Length in seconds of what the input `time` or `frame` plays. */
+  /** Duration in seconds of the animation of the input `time` or `frame`. */
   readonly duration?: number;
-  /** Frames to a second of what the input `frame` counts. */
+  /** Frames per second of the input `frame`. */
   readonly fps?: number;
   readonly coordinates?: Coordinates;
-  /** True if trained with opacity compensation for the screen-space dilation (Mip-Splatting style). Default false. */
+  /**
+   * Whether the model was trained with opacity compensation for the screen-space dilation (Mip-Splatting style).
+   * Default false.
+   */
   readonly antialiased?: boolean;
-  /** The screen-space low-pass filter that it was trained with; counts in place of `antialiased`. */
+  /** The screen-space low-pass filter of training; overrides `antialiased`. */
   readonly filter?: SplatFilter;
-  /** SPDX identifier, or a few words. */
+  /** SPDX identifier, or a short description. */
   readonly license?: string;
-  /** Who is to be named. */
+  /** Author to credit. */
   readonly attribution?: string;
 }
 
 /**
- * A symbolic axis that stands first in every Gaussian output, in the count, and in those inputs that may differ from instance to instance.
- * Behind it shapes are those of one instance, with N fixed. Inputs without it are the same for all instances of a run.
+ * A symbolic axis that comes first in every Gaussian output, in the count, and in the inputs that may differ between
+ * instances. The remaining dimensions are those of one instance, with N fixed. Inputs without the axis are shared by
+ * all instances of a run.
  */
 export interface Instances {
   /** Name of the symbolic dimension in the file. */
   readonly axis: string;
-  /** Most instances that one run takes. */
+  /** Maximum number of instances in one run. */
   readonly most: number;
 }
 
-/** The frame that Gaussians are written in. Default: y down, right-handed, the trainers' frame; units unknown. */
+/** Coordinate system of the Gaussians. Default: y down, right-handed, as in training; units unknown. */
 export interface Coordinates {
   readonly up?: '+x' | '-x' | '+y' | '-y' | '+z' | '-z';
   readonly handedness?: 'right' | 'left';
-  /** Metres to one world unit. */
+  /** Meters in one world unit. */
   readonly metresPerUnit?: number;
 }
 
-/** How the 16 numbers of a matrix that acts on column vectors are laid out in the tensor; default `row-major`, as PyTorch reads it. */
+/** Layout of the 16 numbers of a matrix that acts on column vectors; default `row-major`, as in PyTorch. */
 export type MatrixOrder = 'row-major' | 'column-major';
 
 /**
- * Where the camera's x, y and z axes point: left or right, up or down, forward or back. `RDF` is OpenCV's and the
+ * Directions of the camera's x, y and z axes: left or right, up or down, forward or back. `RDF` is OpenCV's and the
  * default, `RUB` OpenGL's, `LUF` PyTorch3D's and Visionary's.
  */
 export type CameraAxes = 'RDF' | 'RDB' | 'RUF' | 'RUB' | 'LDF' | 'LDB' | 'LUF' | 'LUB';
 
-/** Order of the four numbers of a quaternion. */
+/** Order of the components of a quaternion. */
 export type QuaternionOrder = 'wxyz' | 'xyzw';
 
-/** Whether red, green and blue are innermost ([(d+1)², 3]), or the coefficients ([3, (d+1)²], as in INRIA's PLY files). */
+/** Innermost dimension: red, green and blue ([(d+1)², 3]), or the coefficients ([3, (d+1)²], as in INRIA's PLY files). */
 export type ShOrder = 'coefficient-major' | 'channel-major';
 
 /** [4,4] float32: world to camera. */
@@ -91,15 +98,15 @@ export interface CameraToWorldInput {
 /** [3,3] float32, row-major: fx 0 cx, 0 fy cy, 0 0 1; or [4]: fx, fy, cx, cy. */
 export interface IntrinsicsInput {
   readonly role: 'intrinsics';
-  /** `normalized`: focal lengths and principal point as shares of the image's width and height. */
+  /** `normalized`: focal lengths and principal point as fractions of the image's width and height. */
   readonly unit: 'pixels' | 'normalized';
 }
 
-/** [4,4] float32: camera to clip space, depth 0..1 from near to far as WebGPU has it, x right and y up. */
+/** [4,4] float32: camera to clip space, depth 0..1 from near to far as in WebGPU, x right and y up. */
 export interface ProjectionInput {
   readonly role: 'projection';
   readonly order?: MatrixOrder;
-  /** Axes of the camera that the matrix takes points from. */
+  /** Axes of the camera space that the matrix transforms. */
   readonly axes?: CameraAxes;
 }
 
@@ -119,40 +126,43 @@ export interface ViewportInput {
   readonly role: 'viewport';
 }
 
-/** One float32: seconds, or a share 0..1 of the contract's `duration`, which must then be declared. */
+/** One float32: seconds, or a fraction 0..1 of the contract's `duration`, which must then be declared. */
 export interface TimeInput {
   readonly role: 'time';
   readonly unit: 'seconds' | 'normalized';
 }
 
-/** One int32 or int64: index of a frame, 0 or more. By `fps` the one that the time falls into, the last one at the end of `duration`; without `fps` 0. */
+/**
+ * One int32 or int64: index of a frame, 0 or more. With `fps` it is the frame at the current time, at the end of
+ * `duration` the last one; without `fps` it is 0.
+ */
 export interface FrameInput {
   readonly role: 'frame';
 }
 
-/** One int32 or int64: seed of a generator that draws random numbers. Without it outputs must repeat. */
+/** One int32 or int64: seed of a generator of random numbers. Without it outputs must be reproducible. */
 export interface SeedInput {
   readonly role: 'seed';
 }
 
 /**
- * [J,3] axis-angle in radians, [J,4] quaternions, [J,3,3] row-major rotation matrices, any of them flat ([3J], [4J], [9J]), or [P] parameters of the
- * model's own; float32.
+ * [J,3] axis-angle in radians, [J,4] quaternions, [J,3,3] row-major rotation matrices, any of them flat ([3J], [4J],
+ * [9J]), or [P] model-specific parameters; float32.
  */
 export interface PoseInput {
   readonly role: 'pose';
   readonly format: 'axis-angle' | 'quaternion' | 'matrix' | 'parameters';
   /** Required for quaternions. */
   readonly quaternionOrder?: QuaternionOrder;
-  /** Names of the J joints, in the tensor's order. */
+  /** Names of the J joints, in the order of the tensor. */
   readonly joints?: readonly string[];
-  /** For each joint the index of its parent, -1 for roots; a parent stands before its children. */
+  /** Index of the parent of each joint, -1 for roots; parents precede their children. */
   readonly parents?: readonly number[];
   /** Flattened; default: no rotation, or zeros. */
   readonly default?: readonly number[];
 }
 
-/** [B] float32: coefficients of a body or an expression. */
+/** [B] float32: coefficients of a body shape or an expression. */
 export interface ShapeInput {
   readonly role: 'shape';
   /** Names of the B coefficients. */
@@ -161,41 +171,41 @@ export interface ShapeInput {
   readonly default?: readonly number[];
 }
 
-/** Float32, int32 or int64 of any fixed shape: a control for visitors, named as the input is. */
+/** Float32, int32 or int64 of any fixed shape: a control for visitors, with the name of the input. */
 export interface ControlInput {
   readonly role: 'control';
-  /** Smallest and largest value of each element. */
+  /** Minimum and maximum of each element. */
   readonly range: readonly [min: number, max: number];
-  /** One number for all elements, or all of them flattened. */
+  /** One number for all elements, or the flattened elements. */
   readonly default: number | readonly number[];
   /** Step between values. */
   readonly step?: number;
-  /** Name for readers; default: that of the input. */
+  /** Display name; default: the name of the input. */
   readonly label?: string;
 }
 
 /**
- * What the model itself wrote in the run before this one: float32, float16 or int32 of any fixed shape, that of an output. Physics and temporal filters are
- * such models. A run happens whenever another input changes; when the time goes back, the state begins anew.
+ * Output of the model's previous run: float32, float16 or int32 of any fixed shape, that of an output. Used for physics
+ * and temporal filters. A run happens whenever another input changes; when the time goes back, the state is reset.
  */
 export interface StateInput {
   readonly role: 'state';
-  /** Name of the output that the next run takes here. */
+  /** Name of the output that feeds the next run. */
   readonly output: string;
-  /** Before the first run: one number for all elements. Default 0. */
+  /** Initial value of all elements. Default 0. */
   readonly default?: number;
 }
 
-/** Gaussians of the generator before this one in a chain, in one of the output layouts: one input for each tensor. */
+/** Gaussians of the previous generator in a chain, in one of the output layouts: one input for each tensor. */
 export interface GaussiansInput extends Activations {
   readonly role: 'gaussians';
-  /** Which tensor of the layout this input takes. */
+  /** Tensor of the layout that feeds this input. */
   readonly attribute: GaussianTensor;
 }
 
 /**
- * [1,3,H,W] float32 or float16: red, green and blue planes in 0..1, top row first. [1,4,H,W] has alpha, too; [V,3,H,W] are V images of one size, in the
- * order in which the page names them.
+ * [1,3,H,W] float32 or float16: red, green and blue planes in 0..1, top row first. [1,4,H,W] includes alpha; [V,3,H,W]
+ * are V images of one size, in the order that the page specifies.
  */
 export interface ImageInput {
   readonly role: 'image';
@@ -220,27 +230,27 @@ export type InputBinding =
   | GaussiansInput
   | ImageInput;
 
-/** What one Gaussian is made of. */
+/** Attributes of a Gaussian. */
 export type GaussianAttribute = 'positions' | 'covariances' | 'scales' | 'rotations' | 'colors' | 'sh' | 'opacities';
 
-/** A tensor of Gaussians: everything in one, one attribute, or the live count. */
+/** A tensor of Gaussians: all attributes, one attribute, or the live count. */
 export type GaussianTensor = 'packed' | GaussianAttribute | 'count';
 
-/** How numbers are written. Declared, never guessed: each is required where the attribute is there. */
+/** Encoding of the numbers. Each field is required if its attribute is present; nothing is guessed. */
 export interface Activations {
-  /** What the colour columns of a packed tensor hold. */
+  /** Content of the color columns of a packed tensor. */
   readonly color?: 'rgb' | 'sh';
-  /** Whether opacities are written as 0..1 or before the sigmoid. */
+  /** Opacities in 0..1, or before the sigmoid. */
   readonly opacityActivation?: 'linear' | 'logit';
-  /** Whether scales are written as standard deviations or as their natural logarithms. */
+  /** Scales as standard deviations, or as their natural logarithms. */
   readonly scaleActivation?: 'linear' | 'log';
   readonly rotationOrder?: QuaternionOrder;
   readonly shOrder?: ShOrder;
 }
 
 /**
- * One tensor [N, D], float32 or float16: position (3), covariance xx, xy, xz, yy, yz, zz (6), colour (3) or spherical
- * harmonics (3(d+1)²), opacity (1); or in the order that `columns` gives.
+ * One tensor [N, D], float32 or float16: position (3), covariance xx, xy, xz, yy, yz, zz (6), color (3) or spherical
+ * harmonics (3(d+1)²), opacity (1); or in the order of `columns`.
  */
 export interface PackedOutputs {
   readonly layout: 'packed';
@@ -251,57 +261,57 @@ export interface PackedOutputs {
   /** Required with `sh`. */
   readonly shOrder?: ShOrder;
   /**
-   * What a row holds, in order: positions (3), covariances (6) or scales (3) and rotations (4), colors (3) or sh, opacities (1). Default: positions, covariances,
-   * colours, opacities.
+   * Attributes of a row, in order: positions (3), covariances (6) or scales (3) and rotations (4), colors (3) or sh,
+   * opacities (1). Default: positions, covariances, colors, opacities.
    */
   readonly columns?: readonly GaussianAttribute[];
-  /** Required where `columns` has scales. */
+  /** Required if `columns` contains scales. */
   readonly scaleActivation?: 'linear' | 'log';
-  /** Required where `columns` has rotations. */
+  /** Required if `columns` contains rotations. */
   readonly rotationOrder?: QuaternionOrder;
-  /** Name of an output [1] int32 or int64: how many of the N rows live. */
+  /** Name of an output [1] int32 or int64: number of live rows of the N. */
   readonly count?: string;
 }
 
 /** One tensor for each attribute, all float32 or all float16, all with the same N. Values are names of outputs. */
 export interface SplitOutputs {
   readonly layout: 'split';
-  /** [N,3] centres in world units. */
+  /** [N,3] centers in world units. */
   readonly positions: string;
-  /** [N,6] xx, xy, xz, yy, yz, zz in square world units, or [N,3,3]. Either these, or scales and rotations. */
+  /** [N,6] xx, xy, xz, yy, yz, zz in square world units, or [N,3,3]. Alternative to scales and rotations. */
   readonly covariances?: string;
-  /** [N,3] standard deviations in world units, along the axes that the rotation turns; [N,1] or [N] for all three. */
+  /** [N,3] standard deviations in world units, along the rotated axes; [N,1] or [N] for all three. */
   readonly scales?: string;
   readonly scaleActivation?: 'linear' | 'log';
-  /** [N,4] quaternions, local axes to world; they need not be unit. */
+  /** [N,4] quaternions, local axes to world; not necessarily normalized. */
   readonly rotations?: string;
   readonly rotationOrder?: QuaternionOrder;
-  /** [N,3] red, green, blue in 0..1, or [N,4], whose fourth is not read. Either these or `sh`. */
+  /** [N,3] red, green, blue in 0..1, or [N,4], whose fourth component is ignored. Alternative to `sh`. */
   readonly colors?: string;
-  /** [N,(d+1)²,3] or [N,3,(d+1)²], as `shOrder` says, or flat. */
+  /** [N,(d+1)²,3] or [N,3,(d+1)²], according to `shOrder`, or flat. */
   readonly sh?: string;
   readonly shOrder?: ShOrder;
   /** [N] or [N,1]. */
   readonly opacities: string;
   readonly opacityActivation: 'linear' | 'logit';
-  /** Name of an output [1] int32 or int64: how many of the N rows live. */
+  /** Name of an output [1] int32 or int64: number of live rows of the N. */
   readonly count?: string;
 }
 
 /**
- * What Visionary's exporters write: one tensor [N,10] = position, opacity 0..1, covariance xx, xy, xz, yy, yz, zz; and
- * another with colours [N,4] (the fourth is padding) or [N,3], or coefficient-major harmonics [N,3(d+1)²].
+ * Layout of Visionary's exporters: one tensor [N,10] = position, opacity 0..1, covariance xx, xy, xz, yy, yz, zz; and
+ * another with colors [N,4] (the fourth is padding) or [N,3], or coefficient-major harmonics [N,3(d+1)²].
  */
 export interface VisionaryOutputs {
   readonly layout: 'visionary';
   readonly gaussians: string;
-  /** Either these or `sh`. */
+  /** Alternative to `sh`. */
   readonly colors?: string;
   readonly sh?: string;
   readonly count?: string;
 }
 
-/** A post-processor: one tensor [1,3,H,W] of red, green and blue planes in 0..1; a fourth is not read. */
+/** Output of a post-processor: one tensor [1,3,H,W] of red, green and blue planes in 0..1; a fourth plane is ignored. */
 export interface ImageOutputs {
   readonly layout: 'image';
   readonly image: string;

@@ -19,18 +19,18 @@ const HALF_ROUNDING = 2 ** -11;
 const FLOAT_ROUNDING = 2 ** -24;
 /** Absolute rounding error of float16 numbers near zero. */
 const HALF_SMALLEST = 2 ** -25;
-/** A covariance R·S·Sᵀ·Rᵀ computed in the type of its numbers takes some ten roundings to each of them. */
+/** A covariance R·S·Sᵀ·Rᵀ computed in the precision of its numbers accumulates about ten roundings in each of them. */
 const COVARIANCE_ROUNDINGS = 16;
 
-/** Its square is a covariance in float32. */
+/** Limit at which the square is still a float32 covariance. */
 const LARGEST_SCALE = 1e18;
 
-/** What is wrong with one attribute of one row; undefined if nothing is. */
+/** Checks one attribute of one row; undefined if it is valid. */
 export function checkRow(reader: RowReader, row: number): RowFault | undefined {
   const { attribute, activation, components, read } = reader;
   for (let i = 0; i < components; i++) {
     const value = read(row, i);
-    // Infinite logits and the logarithm of a zero scale are opacities 0 and 1 and a flat disc.
+    // Infinite logits and the logarithm of a zero scale mean opacities 0 and 1 and a flat disc.
     const isAllowed = activation === 'logit' ? !Number.isNaN(value) : activation === 'log' && value === -Infinity;
     if (!Number.isFinite(value) && !isAllowed) return notFinite(value);
   }
@@ -88,14 +88,14 @@ function checkRotation({ read }: RowReader, row: number): RowFault | undefined {
   };
 }
 
-/** Of a matrix of three rows. */
+/** Indices in a matrix of three rows. */
 const UPPER_TRIANGLE = [0, 1, 2, 4, 5, 8];
 
 function checkCovariance({ read, isHalf, components }: RowReader, row: number): RowFault | undefined {
   const matrix = (components === 9 ? UPPER_TRIANGLE : [0, 1, 2, 3, 4, 5]).map((i) => read(row, i));
   const trace = matrix[0] + matrix[3] + matrix[5];
   const rounding = COVARIANCE_ROUNDINGS * FLOAT_ROUNDING + (isHalf ? HALF_ROUNDING : 0);
-  // Rounding moves an eigenvalue by no more than the Frobenius norm of the errors.
+  // Rounding shifts an eigenvalue by at most the Frobenius norm of the errors.
   const slack = rounding * Math.abs(trace) + (isHalf ? 3 * HALF_SMALLEST : 0);
   const smallest = smallestEigenvalue(matrix);
   if (smallest >= -slack) return undefined;

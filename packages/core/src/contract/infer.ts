@@ -3,7 +3,7 @@ import { ContractError, type ContractFault } from './contract-error.js';
 import type { Contract, InputBinding, OutputBinding } from './contract.js';
 import { inferVisionary } from './visionary.js';
 
-/** A contract that nobody wrote, with what was taken for granted, in sentences without a full stop. */
+/** An inferred contract, with its assumptions in sentences without a full stop. */
 export interface InferredContract {
   readonly contract: Contract;
   readonly notes: readonly string[];
@@ -32,7 +32,7 @@ function inferPose(lastDim: unknown): InputBinding {
 
 /**
  * Infers a contract from canonical names of inputs and outputs, or from Visionary's.
- * @throws ContractError `contract/inference`, one for each input and for the outputs that say too little.
+ * @throws ContractError `contract/inference`, one for each input and for the outputs whose meaning is ambiguous.
  */
 export function inferContract(header: OnnxHeader): InferredContract {
   const visionary = inferVisionary(header);

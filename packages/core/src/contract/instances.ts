@@ -3,32 +3,32 @@ import type { ContractFault } from './contract-error.js';
 import type { Contract } from './contract.js';
 import { tensorNames } from './parse-contract.js';
 
-/** What a run wrote to one output. */
+/** One output of a run. */
 export interface OutputTensor {
   readonly dtype: string;
   readonly dims: readonly number[];
-  /** Numbers in row-major order; float16 as bits in a `Uint16Array`, or as a `Float16Array` where there is one. */
+  /** Numbers in row-major order; float16 as bits in a `Uint16Array`, or as a `Float16Array` if the browser has it. */
   readonly data: ArrayLike<number>;
 }
 
-/** Inputs that come from another model or are a picture: all instances of a run share them. */
+/** Inputs from another model or from an image: all instances of a run share them. */
 const SHARED_ROLES: readonly string[] = ['gaussians', 'image', 'state'];
 
-/** True if a tensor has a row for each instance: its first dimension is the axis that the contract names. */
+/** Whether a tensor has a row for each instance: its first dimension is then the axis that the contract names. */
 export function hasInstances({ dims }: Pick<OnnxTensor, 'dims'>, { instances }: Contract): boolean {
   return instances !== undefined && dims?.[0] === instances.axis;
 }
 
 /**
- * The header of one instance: the same without the instances' axis. What roles and layouts ask of shapes, they ask of this one.
- * @returns the header itself where the contract declares no instances.
+ * Returns the header of one instance, without the axis of instances. The rules of roles and layouts apply to it.
+ * @returns The header itself if the contract declares no instances.
  */
 export function oneInstance(header: OnnxHeader, contract: Contract): OnnxHeader {
   if (contract.instances === undefined) return header;
   return withAxis(header, contract, (rest) => rest);
 }
 
-/** The header of a run of `count` instances: the axis is that number. */
+/** Returns the header of a run of `count` instances: the axis is that number. */
 export function ofInstances(header: OnnxHeader, contract: Contract, count: number): OnnxHeader {
   return withAxis(header, contract, (rest) => [count, ...rest]);
 }
@@ -39,7 +39,7 @@ function withAxis(header: OnnxHeader, contract: Contract, change: (rest: OnnxDim
   return { ...header, inputs: header.inputs.map(changed), outputs: header.outputs.map(changed) };
 }
 
-/** What one of the instances of a run wrote, as a run without that axis would have written it. */
+/** Returns the outputs of one instance of a run, as a run without that axis would write them. */
 export function outputsOfInstance(
   outputs: Readonly<Record<string, OutputTensor>>,
   instance: number,
@@ -52,12 +52,15 @@ export function outputsOfInstance(
   return Object.fromEntries(parts);
 }
 
-/** A view, where the numbers are in a typed array. */
+/** Returns a view if the numbers are in a typed array. */
 function partOf(data: ArrayLike<number>, start: number, end: number): ArrayLike<number> {
   return ArrayBuffer.isView(data) ? (data as Float32Array).subarray(start, end) : Array.from(data).slice(start, end);
 }
 
-/** Whether the axis stands where it must: first in every output that the contract names and in at least one input, and nowhere else. */
+/**
+ * Checks that the axis comes first in every output that the contract names and in at least one input, and occurs in no
+ * other place.
+ */
 export function checkInstances(header: OnnxHeader, contract: Contract): ContractFault[] {
   const { instances, outputs, inputs } = contract;
   if (instances === undefined) return [];
@@ -88,7 +91,7 @@ export function checkInstances(header: OnnxHeader, contract: Contract): Contract
         const remedy = `export it with the symbolic axis ${axis} before all others`;
         return fault(`output ${name}`, `${axis} as its first dimension`, `[${dims!.join(', ')}]`, remedy, name);
       }),
-    // Slices of one instance begin at the same place in every run.
+    // The slices of one instance have the same offset in every run.
     ...written
       .filter(
         (output) => hasInstances(output, contract) && output.dims!.slice(1).some((dim) => typeof dim !== 'number'),

@@ -9,49 +9,49 @@ import type { OnnxDim } from '../onnx/header.js';
 import { tensorNames } from './parse-contract.js';
 
 /**
- * Where one attribute of a Gaussian lies: in row i of `tensor` at the elements i·rowStride + offset … + components - 1. All
- * layouts of the contract come down to these.
+ * Location of one attribute of a Gaussian: row i of `tensor` has it in the elements i·rowStride + offset … + components
+ * - 1. All layouts of the contract are converted to these.
  */
 export interface AttributeSlice {
   readonly attribute: GaussianAttribute;
   /** Name of the output. */
   readonly tensor: string;
-  /** Elements before the attribute in a row. */
+  /** Offset of the attribute in a row, in elements. */
   readonly offset: number;
-  /** Elements of the attribute: 9 of covariances that are matrices, 1 of a scale for all axes. */
+  /** Number of elements of the attribute: 9 for covariance matrices, 1 for a scale of all axes. */
   readonly components: number;
-  /** Elements of a row. */
+  /** Number of elements in a row. */
   readonly rowStride: number;
-  /** What is to be undone: `logit` opacities, `log` scales. */
+  /** Activation to invert: `logit` opacities, `log` scales. */
   readonly activation: 'linear' | 'logit' | 'log';
   /** Of rotations. */
   readonly quaternionOrder?: QuaternionOrder;
-  /** Of spherical harmonics. */
+  /** Only for spherical harmonics. */
   readonly shOrder?: ShOrder;
 }
 
-/** How a file writes Gaussians, with everything resolved. */
+/** Layout of the Gaussians of a file, with all defaults resolved. */
 export interface GaussianLayout {
-  /** Rows that live in a run at most, of one instance: N, or `nMax` where that is less or N is symbolic. */
+  /** Maximum number of live rows in a run of one instance: N, or `nMax` if that is less or N is symbolic. */
   readonly capacity: number;
-  /** Rows of the tensors, where padding makes them more than {@link capacity}. */
+  /** Rows of the tensors, if padding makes them more than {@link capacity}. */
   readonly paddedRows?: number;
-  /** True if the number of rows may differ from run to run. */
+  /** Whether the number of rows may differ between runs. */
   readonly isDynamic: boolean;
   readonly dtype: 'float32' | 'float16';
-  /** Undefined where colours are plain. */
+  /** Undefined for plain colors. */
   readonly shDegree: ShDegree | undefined;
   readonly attributes: readonly AttributeSlice[];
-  /** Output that says how many rows live: [1] int32, or int64, of which the lower half is read. */
+  /** Output with the number of live rows: [1] int32, or int64, whose lower half is read. */
   readonly count: string | undefined;
   /** Default int32. */
   readonly countDtype?: 'int32' | 'int64';
 }
 
 /**
- * Where each attribute of the Gaussians lies in the outputs of a file.
- * @returns undefined for a post-processor, which writes an image.
- * @throws ContractError if the file does not keep the contract.
+ * Returns the location of each attribute of the Gaussians in the outputs of a file.
+ * @returns Undefined for a post-processor, which writes an image.
+ * @throws ContractError if the file violates the contract.
  */
 export function gaussianLayout(header: OnnxHeader, contract: Contract): GaussianLayout | undefined {
   const faults = checkContract(header, contract);
@@ -83,7 +83,7 @@ export function gaussianLayout(header: OnnxHeader, contract: Contract): Gaussian
   };
 }
 
-/** Where each attribute lies. @param columnsOf elements of a row of an output. */
+/** Returns the location of each attribute. @param columnsOf Number of elements in a row of an output. */
 export function attributeSlices(outputs: OutputBinding, columnsOf: (tensor: string) => number): AttributeSlice[] {
   switch (outputs.layout) {
     case 'image':
@@ -119,7 +119,7 @@ function packedSlices(outputs: OutputBinding & { layout: 'packed' }, rowStride: 
   });
 }
 
-/** How the numbers of each attribute are written. */
+/** Encoding of the numbers of each attribute. */
 function activationsOf({
   scaleActivation = 'linear',
   rotationOrder,
@@ -160,7 +160,7 @@ function splitSlices(
     const tensor = outputs[attribute];
     if (tensor === undefined) return [];
     const rowStride = columnsOf(tensor);
-    // Of colours with alpha the fourth is not read.
+    // The fourth component of colors with alpha is ignored.
     const components = attribute === 'colors' ? 3 : rowStride;
     return [{ ...linear(attribute, 0, components), ...details[attribute], tensor, rowStride }];
   });

@@ -3,14 +3,14 @@ import type { Contract, InputBinding, OutputBinding } from './contract.js';
 import { CONTRACT_SCHEMA } from './schema.js';
 import { describe, validate } from './validate.js';
 
-/** The version of the contract that this reader knows. */
+/** The supported version of the contract. */
 export const CONTRACT_VERSION = 1;
 
 /**
- * Reads a contract.
+ * Parses a contract.
  *
- * @param json its JSON text, or the value parsed from it.
- * @param where what the contract is called in messages, for example a file name.
+ * @param json Its JSON text, or the parsed value.
+ * @param where Name of the contract in messages, for example a file name.
  * @throws ContractError with every fault: `contract/json`, `contract/version`, `contract/schema`, `contract/conflict`.
  */
 export function parseContract(json: unknown, where = 'contract'): Contract {
@@ -56,7 +56,7 @@ function unknownVersion(version: number, where: string): ContractFault {
   };
 }
 
-/** Facts that are each in order but cannot hold together. */
+/** Finds contradictions between fields that are valid on their own. */
 function conflictsOf(contract: Contract, where: string): ContractFault[] {
   const conflict = (place: string, expected: string, found: string, remedy: string): ContractFault => ({
     code: 'contract/conflict',
@@ -135,7 +135,7 @@ function skeletonConflicts({ joints, parents }: InputBinding & { role: 'pose' })
       ];
 }
 
-/** A row must hold each of what a Gaussian is made of once. */
+/** A row must hold each attribute of a Gaussian exactly once. */
 function columnConflicts(outputs: OutputBinding): Conflict[] {
   if (outputs.layout !== 'packed' || outputs.columns === undefined) return [];
   const { columns, color, scaleActivation, rotationOrder } = outputs;
@@ -154,7 +154,9 @@ function columnConflicts(outputs: OutputBinding): Conflict[] {
   return missing.map((field) => [field, 'a value, since columns has scales and rotations', 'nothing', 'declare it']);
 }
 
-/** Roles that a page sets once: two inputs of the same role are a mistake. Controls and pictures are told apart by name. */
+/**
+ * Roles that a page sets once: two inputs of the same role are an error. Controls and images are distinguished by name.
+ */
 function repeatedRoles({ inputs }: Contract): [place: string, expected: string, found: string][] {
   const seen = new Map<string, string>();
   return Object.entries(inputs).flatMap(([name, binding]) => {
@@ -162,7 +164,7 @@ function repeatedRoles({ inputs }: Contract): [place: string, expected: string, 
     const role = binding.role === 'gaussians' ? `gaussians (${binding.attribute})` : binding.role;
     const first = seen.get(role);
     seen.set(role, name);
-    // Matrices may be wanted in two conventions.
+    // A matrix may be needed in two conventions.
     const isMatrix = ['view', 'camera_to_world', 'intrinsics', 'projection', 'view_projection'].includes(role);
     return first === undefined || isMatrix
       ? []
@@ -170,7 +172,7 @@ function repeatedRoles({ inputs }: Contract): [place: string, expected: string, 
   });
 }
 
-/** Every field of an output binding that names a tensor. */
+/** Returns every field of an output binding that names a tensor. */
 export function tensorNames(outputs: OutputBinding): [field: string, tensor: string][] {
   const fields = [
     'gaussians',

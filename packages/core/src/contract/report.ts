@@ -5,13 +5,13 @@ import { tensorNames } from './parse-contract.js';
 import type { ResolvedContract } from './resolve-contract.js';
 import { findTensor } from './tensor-rules.js';
 
-/** A table for readers: rows of cells, all rows of a section with the same number of cells. */
+/** A table for display: rows of cells, all rows of a section with the same number of cells. */
 export interface ReportSection {
   readonly title: string;
   readonly rows: readonly (readonly string[])[];
 }
 
-/** What a file and its contract say, as tables: the shell prints them, the page shows them. */
+/** Describes a file and its contract as tables: the CLI prints them, the page shows them. */
 export function contractReport(header: OnnxHeader, resolved: ResolvedContract | undefined): ReportSection[] {
   return [
     { title: 'File', rows: fileRows(header) },
@@ -55,7 +55,7 @@ function contractRows({ contract, source, notes }: ResolvedContract): string[][]
   ];
 }
 
-/** Activations and orders; names of tensors stand in the table of outputs. */
+/** Activations and orders; names of tensors are in the table of outputs. */
 function describeDetail([key, value]: [string, unknown]): string[] {
   return /^(color|.*Activation|.*Order)$/.test(key) ? [`${key} ${String(value)}`] : [];
 }
@@ -88,7 +88,7 @@ function outputRows(header: OnnxHeader, contract: Contract | undefined): string[
   ];
 }
 
-/** Digits grouped for people: 1,234,567. */
+/** Formats a number with grouped digits: 1,234,567. */
 function grouped(value: number): string {
   return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
 }

@@ -3,31 +3,34 @@ import type { Contract } from './contract.js';
 import { inferContract } from './infer.js';
 import { parseContract } from './parse-contract.js';
 
-/** Key of `metadata_props` under which an ONNX file carries its own contract, as JSON. */
+/** Key of `metadata_props` under which an ONNX file contains its own contract, as JSON. */
 export const CONTRACT_METADATA_KEY = 'gaussian_contract';
 
-/** Where a contract came from. */
+/** Source of a contract. */
 export type ContractSource = 'explicit' | 'sidecar' | 'metadata' | 'inferred';
 
 export interface ContractSources {
   readonly header: OnnxHeader;
-  /** What the page or the caller gives: JSON text, or the object. */
+  /** Contract of the page or the caller: JSON text, or the object. */
   readonly explicit?: unknown;
-  /** Content of the file beside the model that {@link sidecarName} names: JSON text, or the object. Needed only where {@link carriesContract} is false. */
+  /**
+   * Content of the file beside the model that {@link sidecarName} names: JSON text, or the object. Needed only if
+   * {@link carriesContract} is false.
+   */
   readonly sidecar?: unknown;
 }
 
 export interface ResolvedContract {
   readonly contract: Contract;
   readonly source: ContractSource;
-  /** What was inferred, for a warning; empty where the contract was written. Sentences without a full stop. */
+  /** Inferences, for a warning; empty for a written contract. Sentences without a full stop. */
   readonly notes: readonly string[];
 }
 
 /**
- * The contract of a file: the explicit one, else what its metadata holds, else its sidecar, else inferred from canonical
- * names. The first that is there counts, even if it is wrong: a broken contract is never passed over in silence.
- * @throws ContractError with every fault of that contract's JSON; `contract/inference` where names say too little.
+ * Returns the contract of a file: the explicit one, else that of its metadata, else its sidecar, else one inferred from
+ * canonical names. The first available one is used, even if it is invalid: a broken contract is never ignored silently.
+ * @throws ContractError with every fault of that contract's JSON; `contract/inference` if the names are ambiguous.
  */
 export function resolveContract({ header, explicit, sidecar }: ContractSources): ResolvedContract {
   const written = (source: ContractSource, json: unknown, where: string): ResolvedContract => ({
@@ -42,10 +45,10 @@ export function resolveContract({ header, explicit, sidecar }: ContractSources):
   return { source: 'inferred', ...inferContract(header) };
 }
 
-/** True if the file says itself what it is: no contract beside it is needed. */
+/** Whether the file contains its contract, so that no sidecar is needed. */
 export const carriesContract = ({ metadata }: OnnxHeader): boolean => metadata.has(CONTRACT_METADATA_KEY);
 
-/** Name or address of a model's contract beside it: `NAME.contract.json` for `NAME.onnx`; a query stays where it is. */
+/** Returns the name or address of a model's sidecar: `NAME.contract.json` for `NAME.onnx`; a query is kept. */
 export function sidecarName(model: string): string {
   const [, path, rest] = /^([^?#]*)(.*)$/s.exec(model)!;
   return `${path.replace(/\.(onnx|ort)$/i, '')}.contract.json${rest}`;

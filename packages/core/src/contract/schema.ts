@@ -1,5 +1,5 @@
 /**
- * The JSON Schema of contracts, and the one place that says what a contract's JSON may hold: `parseContract` follows it, and
+ * The JSON Schema of contracts, the single definition of valid contract JSON: `parseContract` follows it, and
  * contract.schema.json is its copy for other languages (`node scripts/write-contract-schema.mjs`).
  */
 import { SPLAT_FILTERS, type SplatFilter } from '../gaussian-cloud.js';
@@ -24,7 +24,10 @@ export interface Schema {
   readonly additionalProperties?: Schema | false;
   readonly required?: readonly string[];
   readonly dependentRequired?: Readonly<Record<string, readonly string[]>>;
-  /** Whole alternatives, told apart by a property with `const`; or objects with `required` alone: exactly one must hold. */
+  /**
+   * Alternatives that are distinguished by a property with `const`; or objects with `required` alone: exactly one must
+   * match.
+   */
   readonly oneOf?: readonly Schema[];
   readonly anyOf?: readonly Schema[];
   readonly allOf?: readonly Schema[];
@@ -43,7 +46,7 @@ const numbers = (description: string, length?: number): Schema => ({
 });
 const texts = (description: string): Schema => ({ type: 'array', items: { type: 'string' }, description });
 
-/** Where `key` has this value, the other properties must be there. */
+/** If `key` has this value, the other properties are required. */
 const requiredWhere = (key: string, value: string, ...others: string[]): Schema => ({
   if: { properties: { [key]: { const: value } }, required: [key] },
   then: { required: others },

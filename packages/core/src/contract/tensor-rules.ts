@@ -11,12 +11,12 @@ import type {
 } from './contract.js';
 
 /**
- * One dimension of a shape: a number; `N`, the number of Gaussians, which may stay symbolic; `H` or `W`, sizes of a picture,
- * which may, too; or another letter, any size that the file must fix.
+ * One dimension of a shape: a number; `N`, the number of Gaussians, which may stay symbolic; `H` or `W`, image sizes,
+ * which may stay symbolic, too; or another letter, any size that the file must fix.
  */
 export type DimRule = number | string;
 
-/** What a tensor of some role must look like: one of the shapes, one of the element types. */
+/** Required shapes and element types of a tensor: one of each must match. */
 export interface TensorRule {
   readonly shapes: readonly (readonly DimRule[])[];
   readonly dtypes: readonly OnnxDtype[];
@@ -34,7 +34,7 @@ export const shColumns = (degree: ShDegree): number => 3 * (degree + 1) ** 2;
 const one = (dtypes: readonly OnnxDtype[]): TensorRule => ({ shapes: [[1], []], dtypes });
 const fixed = (dtypes: readonly OnnxDtype[], ...shapes: (readonly DimRule[])[]): TensorRule => ({ shapes, dtypes });
 
-/** What the input of a role must look like; undefined where any fixed shape will do. */
+/** Returns the rule for the input of a role; undefined if any fixed shape is valid. */
 export function inputRule(binding: InputBinding): TensorRule | undefined {
   switch (binding.role) {
     case 'view':
@@ -60,7 +60,7 @@ export function inputRule(binding: InputBinding): TensorRule | undefined {
     case 'image':
       return fixed(FLOATS, ...IMAGE_SHAPES, ['V', 3, 'H', 'W'], ['V', 4, 'H', 'W']);
     case 'gaussians':
-      // Another model's count is counted in GPU memory, where there are no 64-bit integers to hand on.
+      // Another model's count is computed in GPU memory, which has no 64-bit integers.
       return binding.attribute === 'count' ? one(['int32']) : gaussianRule(binding.attribute, binding);
     case 'control':
     case 'state':
@@ -68,7 +68,7 @@ export function inputRule(binding: InputBinding): TensorRule | undefined {
   }
 }
 
-/** Red, green and blue planes, or those and alpha. */
+/** Red, green and blue planes, optionally with alpha. */
 const IMAGE_SHAPES: readonly (readonly DimRule[])[] = [
   [1, 3, 'H', 'W'],
   [1, 4, 'H', 'W'],
@@ -76,7 +76,7 @@ const IMAGE_SHAPES: readonly (readonly DimRule[])[] = [
   [4, 'H', 'W'],
 ];
 
-/** A row for each joint, or all of them one after the other. */
+/** A row for each joint, or all of them flattened. */
 const POSE_SHAPES: Readonly<Record<PoseInput['format'], readonly (readonly DimRule[])[]>> = {
   'axis-angle': [['J', 3], ['P']],
   quaternion: [['J', 4], ['P']],
@@ -84,7 +84,7 @@ const POSE_SHAPES: Readonly<Record<PoseInput['format'], readonly (readonly DimRu
   parameters: [['P']],
 };
 
-/** Numbers of a joint; 1 where parameters are the model's own. */
+/** Numbers for each joint; 1 for model-specific parameters. */
 export const POSE_NUMBERS: Readonly<Record<PoseInput['format'], number>> = {
   'axis-angle': 3,
   quaternion: 4,
@@ -92,7 +92,10 @@ export const POSE_NUMBERS: Readonly<Record<PoseInput['format'], number>> = {
   parameters: 1,
 };
 
-/** What a tensor of Gaussians must look like. @param fixedColumns of a packed tensor: those that are no colours */
+/**
+ * Returns the rule for a tensor of Gaussians. @param fixedColumns Number of columns of a packed tensor other than
+ * colors.
+ */
 export function gaussianRule(
   tensor: GaussianTensor,
   { color, shOrder }: Activations,
@@ -129,12 +132,12 @@ export function gaussianRule(
   }
 }
 
-/** Elements of a row of a packed tensor that are no colours. */
+/** Number of elements in a row of a packed tensor other than colors. */
 export function fixedColumnsOf({ columns }: Pick<PackedOutputs, 'columns'>): number {
   return columns?.reduce((sum, attribute) => sum + PACKED_WIDTHS[attribute], 0) ?? PACKED_FIXED_COLUMNS;
 }
 
-/** Elements of each attribute in a packed row; colours are as many as the row has left. */
+/** Number of elements of each attribute in a packed row; colors take the rest of the row. */
 export const PACKED_WIDTHS: Readonly<Record<GaussianAttribute, number>> = {
   positions: 3,
   covariances: 6,
@@ -145,7 +148,7 @@ export const PACKED_WIDTHS: Readonly<Record<GaussianAttribute, number>> = {
   sh: 0,
 };
 
-/** What the output that a field of the binding names must look like. */
+/** Returns the rule for the output that a field of the binding names. */
 export function outputRule(binding: OutputBinding, field: string): TensorRule {
   if (binding.layout === 'image') return fixed(FLOATS, ...IMAGE_SHAPES);
   if (field === 'count') return gaussianRule('count', {});
@@ -156,14 +159,15 @@ export function outputRule(binding: OutputBinding, field: string): TensorRule {
   return fixed(FLOATS, ...SH_DEGREES.map((degree) => ['N', shColumns(degree)]));
 }
 
-/** True if the file's dimensions are those of one of the shapes, but for ones before them. */
+/** Whether the dimensions of a file match one of the shapes, except for leading ones. */
 export function shapeFits(dims: readonly OnnxDim[], rule: TensorRule): boolean {
   return bareDims(dims, rule) !== undefined;
 }
 
 /**
- * A tensor's dimensions as one of the shapes has them. Ones before them, a batch of one, change no byte, and are left away: as few as it takes.
- * @returns undefined where no shape fits.
+ * Returns the dimensions of a tensor without leading ones, as in one of the shapes. Such ones, a batch of one, change
+ * no byte; as few as necessary are removed.
+ * @returns Undefined if no shape matches.
  */
 export function bareDims(dims: readonly OnnxDim[], { shapes }: TensorRule): readonly OnnxDim[] | undefined {
   const fits = shapes.some((shape) => shape.length === dims.length && shape.every((rule, i) => dimFits(dims[i], rule)));
@@ -177,12 +181,12 @@ function dimFits(dim: OnnxDim, rule: DimRule): boolean {
   return typeof dim === 'number' && dim > 0;
 }
 
-/** The shapes of a rule for people: `[N, 3] or [N, 4]`. */
+/** Formats the shapes of a rule: `[N, 3] or [N, 4]`. */
 export function describeShapes({ shapes }: TensorRule): string {
   return shapes.map((shape) => `[${shape.join(', ')}]`).join(' or ');
 }
 
-/** Degree of the harmonics in a tensor whose shape fits; undefined if it holds none. */
+/** Degree of the harmonics in a tensor with a valid shape; undefined if it holds none. */
 export function shDegreeOf(binding: OutputBinding, dims: readonly OnnxDim[]): ShDegree | undefined {
   if (binding.layout === 'image') return undefined;
   if (binding.layout === 'packed') {
@@ -195,6 +199,6 @@ function degreeOfColumns(columns: number): ShDegree | undefined {
   return SH_DEGREES.find((degree) => shColumns(degree) === columns);
 }
 
-/** Name, shape and type of a tensor that may be missing from a file. */
+/** Finds a tensor by its name; undefined if the file lacks it. */
 export const findTensor = (tensors: readonly OnnxTensor[], name: string): OnnxTensor | undefined =>
   tensors.find((tensor) => tensor.name === name);

@@ -3,8 +3,8 @@ import type { ContractFault } from './contract-error.js';
 import type { Schema } from './schema.js';
 
 /**
- * Holds a parsed JSON value against a schema and names every fault. Where alternatives are told apart by a property
- * (`role`, `layout`), faults are those of the alternative that was meant.
+ * Validates a parsed JSON value against a schema and reports every fault. If alternatives are distinguished by a
+ * property (`role`, `layout`), faults are those of the selected alternative.
  */
 export function validate(value: unknown, schema: Schema, where: string): ContractFault[] {
   if (schema.oneOf) return [...validateOneOf(value, schema, where), ...validateOwn(value, schema, where)];
@@ -19,7 +19,7 @@ function validateOwn(value: unknown, schema: Schema, where: string): ContractFau
   return [];
 }
 
-/** What was expected instead of the value, by the keywords that speak of one value alone; undefined if it is right. */
+/** Describes the expected value if the value itself violates a keyword; undefined if it is valid. */
 function mismatchOf(value: unknown, schema: Schema): string | undefined {
   const { type, const: only, enum: choices, minLength, minimum, maximum, exclusiveMinimum, anyOf } = schema;
   if (only !== undefined && value !== only) return JSON.stringify(only);
@@ -92,12 +92,12 @@ function validateConditions(value: Record<string, unknown>, schema: Schema, wher
     if (part.oneOf) return validateOneOf(value, part, where);
     if (!part.if || validateOwn(value, part.if, '').length > 0) return [];
     const missing = part.then?.required?.filter((key) => !Object.hasOwn(value, key)) ?? [];
-    // Fields that only a condition asks for are described where they are defined.
+    // Fields that only a condition requires are described at their definition.
     return missing.map((key) => missingField(where, key, schema.properties?.[key]));
   });
 }
 
-/** Alternatives with a property that tells them apart, or exactly one of several properties. */
+/** Alternatives with a distinguishing property, or exactly one of several properties. */
 function validateOneOf(value: unknown, { oneOf = [], description }: Schema, where: string): ContractFault[] {
   const key = discriminatorOf(oneOf[0]);
   if (key === undefined) {
@@ -115,7 +115,7 @@ function validateOneOf(value: unknown, { oneOf = [], description }: Schema, wher
   return [fault(`${where}.${key}`, `one of ${choices}`, found, { description })];
 }
 
-/** The property by whose `const` alternatives are told apart. */
+/** The property whose `const` distinguishes alternatives. */
 function discriminatorOf({ properties = {} }: Schema): string | undefined {
   return Object.keys(properties).find((key) => properties[key].const !== undefined);
 }
@@ -159,13 +159,13 @@ function schemaFault(where: string, expected: string, found: string, remedy: str
 const isObject = (value: unknown): value is Record<string, unknown> =>
   typeof value === 'object' && value !== null && !Array.isArray(value);
 
-/** A value for messages, cut short. */
+/** Formats a value for messages, truncated. */
 export function describe(value: unknown): string {
   let json: string | undefined;
   try {
     json = JSON.stringify(value);
   } catch {
-    // Lists within lists, more than calls can be within calls.
+    // Nested lists may be deeper than the call stack.
     return 'a value that is too deep to be shown';
   }
   return json === undefined ? 'nothing' : json.length > 60 ? `${json.slice(0, 57)}...` : json;

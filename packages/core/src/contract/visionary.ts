@@ -4,9 +4,9 @@ import type { Contract, InputBinding, VisionaryOutputs } from './contract.js';
 import type { InferredContract } from './infer.js';
 
 /**
- * Files exported for Visionary carry no contract. Their outputs are known by name: `gauss…` [N,10], one with `color`, `rgb` or
- * `sh` in its name, `num_points`. Their camera looks along +z with x left and y up, their matrices are the bytes of
- * column-major ones, their time is a share of a cycle of 2.5 s.
+ * Files exported for Visionary carry no contract. Their outputs are recognized by name: `gauss…` [N,10], one with
+ * `color`, `rgb` or `sh` in its name, `num_points`. Their camera looks along +z with x left and y up, their matrices
+ * are column-major, and their time is a fraction of a cycle of 2.5 s.
  */
 export function inferVisionary(header: OnnxHeader): InferredContract | undefined {
   const outputs = visionaryOutputs(header);
@@ -40,7 +40,7 @@ export function inferVisionary(header: OnnxHeader): InferredContract | undefined
   return { contract, notes: ["names are those of Visionary's exporters", ...roles, describeOutputs(outputs)] };
 }
 
-/** Visionary plays 0.4 of a cycle to a second. */
+/** Visionary plays 0.4 cycles per second. */
 const VISIONARY_CYCLE_SECONDS = 2.5;
 
 function visionaryOutputs({ outputs }: OnnxHeader): VisionaryOutputs | undefined {
@@ -58,8 +58,8 @@ function visionaryOutputs({ outputs }: OnnxHeader): VisionaryOutputs | undefined
 }
 
 /**
- * Role of an input by its name. Visionary asks for `matrix` before it asks for `proj`, and so feeds the camera to
- * `projection_matrix`; here such an input gets what its name says.
+ * Role of an input by its name. Visionary tests for `matrix` before `proj`, and so feeds the camera to
+ * `projection_matrix`; here such an input gets the projection.
  */
 function visionaryInput(name: string): InputBinding | undefined {
   const lower = name.toLowerCase();

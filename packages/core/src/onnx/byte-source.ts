@@ -1,12 +1,12 @@
-/** A file that can be read in pieces, wherever it lies. */
+/** A file that can be read in ranges, at any location. */
 export interface ByteSource {
   /** Name for messages: a file name or an address. */
   readonly name: string;
   /** Length in bytes. */
   readonly size: number;
-  /** Bytes worth asking for at once: all of them in memory, some kilobytes over a network. */
+  /** Suggested size of a read: all bytes in memory, some kilobytes over a network. */
   readonly chunk: number;
-  /** The bytes from `offset` on: `length` of them, or fewer where the file ends. Never more, never beyond the end. */
+  /** Returns `length` bytes from `offset` on, or fewer at the end of the file. */
   read(offset: number, length: number): Promise<Uint8Array>;
 }
 
@@ -20,7 +20,7 @@ export function bytesSource(bytes: Uint8Array, name = 'model.onnx'): ByteSource 
   };
 }
 
-/** A `File` that was dropped on a page, or any `Blob`: only the pieces that are asked for are read. */
+/** A `File` that was dropped on a page, or any `Blob`: only the requested ranges are read. */
 export function blobSource(blob: Blob, name = 'name' in blob ? String(blob.name) : 'model.onnx'): ByteSource {
   return {
     name,

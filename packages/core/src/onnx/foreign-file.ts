@@ -1,6 +1,6 @@
 import { GaussianSplatError, type ErrorCode } from '../errors.js';
 
-/** A kind of file that is recognised only to say what it is. */
+/** A kind of file that is recognized only for an error message. */
 interface ForeignKind {
   readonly code: ErrorCode;
   readonly found: string;
@@ -18,7 +18,7 @@ const other = (found: string, fits: ForeignKind['fits'], remedy = GIVE_ONNX): Fo
   fits,
 });
 
-/** The first that fits wins. Text is one character for each byte. */
+/** The first match wins. Text is one character for each byte. */
 const KINDS: readonly ForeignKind[] = [
   other('an empty file', (text) => text === '', 'export or download the model again'),
   {
@@ -63,10 +63,10 @@ const KINDS: readonly ForeignKind[] = [
   other('a text', (text) => /^[\t\n\r -~]{8,}$/.test(text)),
 ];
 
-/** How many first bytes the signatures need. */
+/** Number of leading bytes that the signatures need. */
 export const SIGNATURE_BYTES = 512;
 
-/** The error for a file that begins like something else than an ONNX model; undefined if it may be one. */
+/** Returns the error for a file with another signature than an ONNX model; undefined if it may be one. */
 export function diagnoseForeignFile(head: Uint8Array, name: string, size: number): GaussianSplatError | undefined {
   const text = new TextDecoder('latin1').decode(head.subarray(0, SIGNATURE_BYTES));
   const kind = KINDS.find(({ fits }) => fits(text));

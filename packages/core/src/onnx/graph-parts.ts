@@ -10,18 +10,18 @@ import {
 import type { LoadedBytes } from './loaded-bytes.js';
 import { FieldCursor, type Span } from './protobuf.js';
 
-/** Longest name, in bytes, that is believed. */
+/** Maximum length of a name in bytes. */
 export const NAME_LIMIT = 65_536;
-/** Dimensions of a stored tensor that are kept; no rule asks about tensors of more. */
+/** Maximum rank of a stored tensor whose dimensions are kept; no rule needs more. */
 const KEPT_RANK = 8;
-/** Bytes of a tensor of 64-bit integers that are read: shapes of reshaped tensors are that short. */
+/** Maximum length of a tensor of 64-bit integers that is read: shapes for Reshape are that short. */
 const SHAPE_BYTES = 8 * KEPT_RANK;
-/** Most dimensions of a tensor that are believed. */
+/** Maximum rank of a tensor. */
 const RANK_LIMIT = 64;
-/** Subgraphs within subgraphs, as `If` and `Loop` have them, before a file counts as hostile. */
+/** Maximum nesting of subgraphs, as in `If` and `Loop`, before a file counts as hostile. */
 const DEPTH_LIMIT = 32;
 
-/** The parts of a graph that a header reports, gathered from any level of nesting. */
+/** Parts of a graph for the header, collected over all nesting levels. */
 export interface Harvest {
   readonly operators: string[];
   readonly externalFiles: ExternalFile[];
@@ -43,7 +43,7 @@ export const emptyHarvest = (): Harvest => ({
   initializerBytes: 0,
 });
 
-// Numbers of fields are those of https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
+// Field numbers are those of https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
 
 /** `ValueInfoProto`: name and type of an input or output. */
 export function readValueInfo(bytes: LoadedBytes, span: Span): OnnxTensor {
@@ -57,7 +57,7 @@ export function readValueInfo(bytes: LoadedBytes, span: Span): OnnxTensor {
   return { name, ...type };
 }
 
-/** What a `TypeProto` may hold besides a tensor, by field number. */
+/** Kinds of `TypeProto` other than a tensor, by field number. */
 const NON_TENSORS: Readonly<Record<number, OnnxDtype>> = {
   4: 'sequence',
   5: 'map',
@@ -104,14 +104,14 @@ function readDim(bytes: LoadedBytes, span: Span): OnnxDim {
   let dim: OnnxDim = null;
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
-    // Exporters write -1 or 0 and an empty symbol for "not known"; 0 itself is a legal size.
+    // Exporters write -1 or 0 and an empty symbol for an unknown size; 0 itself is a legal size.
     if (field.number === 1 && field.isVarint) dim = field.value >= 0 ? field.value : null;
     if (field.number === 2) dim = field.text(NAME_LIMIT) || null;
   }
   return dim;
 }
 
-/** `NodeProto`: its operator, what it reads and writes, and whatever its attributes hold. */
+/** `NodeProto`: its operator, inputs, outputs, and attributes. */
 export function readNode(bytes: LoadedBytes, span: Span, harvest: Harvest, depth = 0): void {
   let operator = '';
   let domain = '';
@@ -135,12 +135,12 @@ export function readNode(bytes: LoadedBytes, span: Span, harvest: Harvest, depth
 
 type NodeAttributes = { -readonly [Key in 'numbers' | 'lists' | 'value']?: OnnxNode[Key] };
 
-/** `MatMul` in ONNX's own domain, `com.example:Name` elsewhere. */
+/** `MatMul` for ONNX's own domain, `com.example:Name` for others. */
 export function operatorName(domain: string, operator: string): string {
   return domain === '' || domain === 'ai.onnx' ? operator : `${domain}:${operator}`;
 }
 
-/** `AttributeProto`: whole numbers, lists of them and tensors are kept; subgraphs are gathered. */
+/** `AttributeProto`: integers, lists of integers and tensors are kept; subgraphs are collected. */
 function readAttribute(bytes: LoadedBytes, span: Span, harvest: Harvest, found: NodeAttributes, depth: number): void {
   let name = '';
   let whole: number | undefined;
@@ -175,7 +175,10 @@ function readSubgraph(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: n
   }
 }
 
-/** `TensorProto`: name, type, shape, external files and size; the weights are passed over, but for shapes of other tensors. */
+/**
+ * `TensorProto`: name, type, shape, external files and size; the weights are skipped, except for shapes of other
+ * tensors.
+ */
 export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): { name: string; value: OnnxValue } {
   let name = '';
   const entries = new Map<string, string>();
@@ -203,7 +206,7 @@ export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): { 
   return { name, value };
 }
 
-/** Whole numbers in one field, one after the other; none where there are more than `most`. */
+/** Integers in one packed field; none if there are more than `most`. */
 function packedVarints(bytes: LoadedBytes, span: Span, most: number): number[] {
   if (span.end - span.start > 10 * most) return [];
   const numbers: number[] = [];
@@ -230,7 +233,7 @@ function rawIntegers(bytes: LoadedBytes, { start, end }: Span): number[] {
   });
 }
 
-/** `SparseTensorProto`: values and indices are tensors; the first names the whole. */
+/** `SparseTensorProto`: values and indices are tensors; the name is that of the values. */
 export function readSparseTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): string {
   let name = '';
   const field = new FieldCursor(bytes, span);
@@ -242,7 +245,7 @@ export function readSparseTensor(bytes: LoadedBytes, span: Span, harvest: Harves
   return name;
 }
 
-/** Bytes that an external file must have for one tensor. */
+/** Required length of an external file for one tensor, in bytes. */
 function externalEnd(entries: ReadonlyMap<string, string>): number {
   const number = (key: string): number => {
     const value = Number(entries.get(key) ?? 0);
@@ -275,7 +278,7 @@ export function readOpset(bytes: LoadedBytes, span: Span): [domain: string, vers
   return [domain || 'ai.onnx', version];
 }
 
-/** `FunctionProto`: name, and the operators that it uses. */
+/** `FunctionProto`: name, and its operators. */
 export function readFunction(bytes: LoadedBytes, span: Span, harvest: Harvest): string {
   let name = '';
   let domain = '';

@@ -2,12 +2,12 @@ import { ONNX_DTYPES, type OnnxDtype, type OnnxHeader, type OnnxNode, type OnnxV
 
 const BOOLEANS = new Set('Equal Less LessOrEqual Greater GreaterOrEqual Not And Or Xor IsNaN IsInf'.split(' '));
 const INT64 = new Set('Shape Size ArgMax ArgMin NonZero'.split(' '));
-/** What comes out has the shape of what goes in first. */
+/** Operators whose output has the shape of the first input. */
 const SAME_SHAPE = new Set('Cast Identity DequantizeLinear QuantizeLinear Neg Abs CastLike Dropout'.split(' '));
 
 /**
- * What is known of the tensors of a graph without running it: which hang on constants alone, which are computed once when the session is
- * made; element types; and shapes of weights, through whatever stands between them and the node that takes them.
+ * Static analysis of the tensors of a graph: values that depend only on constants, which are computed once for a
+ * session; element types; and shapes of weights, through the nodes between them and their consumer.
  */
 export class GraphValues {
   readonly #header: OnnxHeader;
@@ -27,16 +27,16 @@ export class GraphValues {
     for (const node of header.nodes) this.#add(node);
   }
 
-  /** True for what is computed once. */
+  /** Whether a value is computed once. */
   isConstant(name: string): boolean {
     return this.#constants.has(name);
   }
 
-  /** True for a node that takes constants alone. */
+  /** Whether a node depends only on constants. */
   isFolded({ inputs, operator }: OnnxNode): boolean {
-    // The runtime draws random numbers anew in every run.
+    // The runtime draws new random numbers in every run.
     if (/^(Random|Bernoulli|Multinomial|Dropout)/.test(operator)) return false;
-    // Of a tensor of fixed shape the runtime knows it beforehand.
+    // The runtime folds the shape of a tensor with fixed dimensions.
     if (operator === 'Shape' && this.dimsOf(inputs[0])?.every((dim) => dim !== null)) return true;
     return (
       operator === 'Constant' || (inputs.length > 0 && inputs.every((name) => name === '' || this.isConstant(name)))
@@ -56,7 +56,7 @@ export class GraphValues {
     return this.#types.get(name);
   }
 
-  /** Dimensions of a tensor; null for one that only a run tells, undefined where not even the rank is known. */
+  /** Dimensions of a tensor; null for one that only a run determines, undefined if even the rank is unknown. */
   dimsOf(name: string, depth = 0): readonly (number | null)[] | undefined {
     const stored = this.#header.stored.get(name)?.dims;
     if (stored) return stored;
@@ -64,7 +64,7 @@ export class GraphValues {
     const said = values.get(name) ?? [...inputs, ...outputs].find((tensor) => tensor.name === name);
     if (said?.dims) return said.dims.map((dim) => (typeof dim === 'number' ? dim : null));
     const maker = this.#makers.get(name);
-    // Weights are a few steps from where they lie.
+    // Weights are at most a few nodes from their storage.
     return maker === undefined || depth > 16 ? undefined : this.#dimsFrom(maker, depth + 1);
   }
 
@@ -86,7 +86,7 @@ export class GraphValues {
       const index = this.dimsOf(inputs[1], depth);
       return index && [...index, ...from.slice(1)].map(() => null);
     }
-    // Operators of two arguments: weights that are scaled, or added to.
+    // Binary operators: scaled or shifted weights.
     if (['Mul', 'Add', 'Sub', 'Div'].includes(operator)) {
       const other = this.dimsOf(inputs[1], depth);
       return from && other && (from.length >= other.length ? from : other);

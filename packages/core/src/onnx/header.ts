@@ -1,4 +1,4 @@
-/** Element types of ONNX tensors, in the order of their numbers in the format; `undefined` where a file says none. */
+/** Element types of ONNX tensors, indexed by their number in the format; `undefined` if a file declares none. */
 export const ONNX_DTYPES = [
   'undefined',
   'float32',
@@ -26,34 +26,34 @@ export const ONNX_DTYPES = [
   'float4e2m1',
 ] as const;
 
-/** Element type of a tensor, or what an input or output is if it is none. */
+/** Element type of a tensor, or the kind of an input or output that is not a tensor. */
 export type OnnxDtype =
   (typeof ONNX_DTYPES)[number] | 'sequence' | 'map' | 'optional' | 'sparse tensor' | 'opaque' | 'unknown';
 
-/** A dimension: a number, a symbol that the file names, or null where the file says nothing. */
+/** A dimension: a number, a symbol of the file, or null if the file does not declare it. */
 export type OnnxDim = number | string | null;
 
 /** An input or output of the graph. */
 export interface OnnxTensor {
   readonly name: string;
   readonly dtype: OnnxDtype;
-  /** Undefined where the file does not even tell the rank. */
+  /** Undefined if the file does not even declare the rank. */
   readonly dims: readonly OnnxDim[] | undefined;
 }
 
-/** A file beside the model that holds some of its weights. */
+/** A file beside the model with some of its weights. */
 export interface ExternalFile {
-  /** Path relative to the model's folder, as the model writes it. */
+  /** Path relative to the model's folder, as in the model. */
   readonly location: string;
-  /** Bytes that the file must have at least; 0 where the model does not say. */
+  /** Minimum length of the file in bytes; 0 if the model does not declare it. */
   readonly byteLength: number;
 }
 
-/** A tensor that lies in the file: its type and shape, and its numbers where it is the shape of another. */
+/** A tensor stored in the file: its type and shape, and its numbers if it is the shape of another. */
 export interface OnnxValue {
   readonly dtype: OnnxDtype;
   readonly dims: readonly number[];
-  /** Of short vectors of int64. */
+  /** Only for short vectors of int64. */
   readonly integers?: readonly number[];
 }
 
@@ -64,16 +64,16 @@ export interface OnnxNode {
   readonly operator: string;
   readonly inputs: readonly string[];
   readonly outputs: readonly string[];
-  /** True within a subgraph or a function. */
+  /** Whether the node is within a subgraph or a function. */
   readonly isInner: boolean;
-  /** Attributes that are whole numbers, and lists of some. */
+  /** Attributes that are integers, and lists of integers. */
   readonly numbers?: Readonly<Record<string, number>>;
   readonly lists?: Readonly<Record<string, readonly number[]>>;
-  /** Tensor of the attribute `value`, as `Constant` has it. */
+  /** Tensor of the attribute `value`, as in `Constant`. */
   readonly value?: OnnxValue;
 }
 
-/** What an ONNX file says about itself, without its weights. */
+/** Description of an ONNX file, without its weights. */
 export interface OnnxHeader {
   /** File name or address, for messages. */
   readonly name: string;
@@ -87,18 +87,23 @@ export interface OnnxHeader {
   readonly opsets: ReadonlyMap<string, number>;
   /** `metadata_props`. */
   readonly metadata: ReadonlyMap<string, string>;
-  /** Inputs that a caller must give: those that are initializers, too, have a default and are left out. */
+  /** Inputs that a caller must provide: initializers have a default and are excluded. */
   readonly inputs: readonly OnnxTensor[];
-  /** Names of inputs that are initializers, too: what the file gives them counts, for ONNX Runtime in a page takes no other. */
+  /**
+   * Names of inputs that are initializers, too: their stored value is used, because ONNX Runtime Web accepts no other.
+   */
   readonly optionalInputs: readonly string[];
   readonly outputs: readonly OnnxTensor[];
-  /** How often each operator occurs, subgraphs included: `MatMul`, or `com.example:Name` outside ONNX's own domain. */
+  /**
+   * Number of occurrences of each operator, subgraphs included: `MatMul`, or `com.example:Name` outside ONNX's own
+   * domain.
+   */
   readonly operators: ReadonlyMap<string, number>;
-  /** All nodes in the file's order, those of subgraphs and functions before the node that holds them. */
+  /** All nodes in the order of the file, those of subgraphs and functions before the node that contains them. */
   readonly nodes: readonly OnnxNode[];
-  /** Tensors that lie in the file, by name. */
+  /** Tensors stored in the file, by name. */
   readonly stored: ReadonlyMap<string, OnnxValue>;
-  /** What the file says of results between its nodes. */
+  /** Declared types and shapes of intermediate values. */
   readonly values: ReadonlyMap<string, OnnxTensor>;
   /** Operators that the file itself defines, named as in {@link operators}. */
   readonly functions: ReadonlySet<string>;
@@ -107,7 +112,7 @@ export interface OnnxHeader {
   readonly initializerBytes: number;
 }
 
-/** A tensor's type and shape for readers: `float32 [N, 13]`. */
+/** Formats a tensor's type and shape: `float32 [N, 13]`. */
 export function describeTensor({ dtype, dims }: Pick<OnnxTensor, 'dtype' | 'dims'>): string {
   return `${dtype} ${dims ? `[${dims.map((dim) => dim ?? '?').join(', ')}]` : 'of unknown shape'}`;
 }

@@ -1,7 +1,9 @@
 import { GaussianSplatError } from '../errors.js';
 import type { ByteSource } from './byte-source.js';
 
-/** Thrown by a read of bytes that are not in memory yet; {@link LoadedBytes.load} brings them, then the read is repeated. */
+/**
+ * Thrown by a read of bytes that are not in memory yet; {@link LoadedBytes.load} loads them, then the read is repeated.
+ */
 export class NotLoaded {
   readonly offset: number;
 
@@ -18,14 +20,14 @@ interface Segment {
 
 const utf8 = new TextDecoder();
 
-/** The pieces of a file that are in memory, with reads that never wait: they throw {@link NotLoaded} instead. */
+/** The ranges of a file that are in memory, with synchronous reads that throw {@link NotLoaded} for others. */
 export class LoadedBytes {
   readonly source: ByteSource;
   #segments: Segment[] = [];
   #current: Segment = { start: 0, end: 0, bytes: new Uint8Array(0) };
   #fieldsLeft: number;
 
-  /** @param fieldLimit fields that may be read in all, so that hostile files come to an end. */
+  /** @param fieldLimit Maximum total number of fields to read, so that hostile files terminate. */
   constructor(source: ByteSource, fieldLimit: number) {
     this.source = source;
     this.#fieldsLeft = fieldLimit;
@@ -53,7 +55,7 @@ export class LoadedBytes {
     return utf8.decode(bytes);
   }
 
-  /** Reads the piece at an offset into memory. */
+  /** Loads the range at an offset into memory. */
   async load(offset: number): Promise<void> {
     const length = Math.min(this.source.chunk, this.size - offset);
     const bytes = await this.source.read(offset, length);
@@ -61,7 +63,7 @@ export class LoadedBytes {
     this.#segments.push({ start: offset, end: offset + bytes.length, bytes });
   }
 
-  /** Lets go of pieces that end at or before an offset: they will not be read again. */
+  /** Discards ranges that end at or before an offset: they will not be read again. */
   forget(offset: number): void {
     if (this.#segments.length > 1) this.#segments = this.#segments.filter(({ end }) => end > offset);
   }

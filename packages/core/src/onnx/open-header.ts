@@ -3,23 +3,23 @@ import type { OnnxHeader } from './header.js';
 import { readOnnxHeader } from './read-onnx-header.js';
 import { openUrl, type UrlSourceOptions } from './url-source.js';
 
-/** A model of which the header has been read. */
+/** A model with its header. */
 export interface OpenedModel {
   readonly header: OnnxHeader;
-  /** Bytes of the file. */
+  /** Length of the file in bytes. */
   readonly size: number;
-  /** All of them, where reading the header brought them along. */
+  /** The whole file, if reading the header has loaded it. */
   readonly whole?: Uint8Array | undefined;
 }
 
-/** Where a model is: on a server, or in bytes that have arrived. */
+/** Location of a model: a server, or bytes in memory. */
 export type ModelPlace =
   | ({ readonly url: string } & Pick<UrlSourceOptions, 'credentials'>)
   | { readonly bytes: Uint8Array; readonly name: string };
 
 /**
  * Reads the header of a model.
- * @throws GaussianSplatError as {@link readOnnxHeader} and {@link openUrl} do; the reason of the signal
+ * @throws GaussianSplatError as {@link readOnnxHeader} and {@link openUrl} do; the reason of the signal.
  */
 export async function openHeader(place: ModelPlace, signal?: AbortSignal): Promise<OpenedModel> {
   if ('bytes' in place) {

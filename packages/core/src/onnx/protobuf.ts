@@ -12,14 +12,11 @@ export interface Span {
   readonly end: number;
 }
 
-/**
- * Steps through the fields of one protobuf message. Payloads are not touched: a cursor passes over gigabytes by reading
- * their length.
- */
+/** Iterates over the fields of one protobuf message. Payloads are not read: a cursor skips gigabytes by their length. */
 export class FieldCursor implements Span {
   readonly #bytes: LoadedBytes;
   readonly #limit: number;
-  /** Where the next field begins; a cursor that starts here goes on from here. */
+  /** Offset of the next field; a cursor that starts here continues. */
   offset: number;
   /** Field number. */
   number = 0;
@@ -59,7 +56,7 @@ export class FieldCursor implements Span {
     return true;
   }
 
-  /** The current field's payload as text. */
+  /** Returns the current field's payload as text. */
   text(limit: number): string {
     if (!this.isDelimited) throw this.#corrupt(`a number where a text belongs (field ${this.number})`);
     const length = this.end - this.start;
@@ -67,7 +64,7 @@ export class FieldCursor implements Span {
     return this.#bytes.textAt(this.start, length);
   }
 
-  /** End of the current field's payload; sets what the payload is. */
+  /** Returns the end of the current field's payload and records its location. */
   #payload(start: number): number {
     switch (this.#wireType) {
       case VARINT: {
@@ -93,7 +90,7 @@ export class FieldCursor implements Span {
   #within(start: number, length: number): number {
     const end = start + length;
     if (length >= 0 && end <= this.#limit) return end;
-    // The outermost message ends where the file does.
+    // The outermost message ends with the file.
     if (this.#limit === this.#bytes.size && length >= 0) {
       const found = `the end of the file at byte ${this.#bytes.size}`;
       throw this.#bytes.fault('decode/truncated', start, `${length} bytes of field ${this.number}`, found);
@@ -101,7 +98,7 @@ export class FieldCursor implements Span {
     throw this.#corrupt(`a length of ${length} bytes for field ${this.number}, beyond the message that holds it`);
   }
 
-  /** A number of 7 bits to a byte, low bits first, read as a signed 64-bit integer. */
+  /** A varint: 7 bits in each byte, low bits first, read as a signed 64-bit integer. */
   #varint(start: number): { value: number; end: number } {
     let value = 0;
     let factor = 1;
@@ -116,7 +113,8 @@ export class FieldCursor implements Span {
       const byte = this.#bytes.byteAt(at);
       value += (byte % 128) * factor;
       factor *= 128;
-      // Negative numbers fill all ten bytes; below -2^53 a few low bits are lost, which no field that is read here notices.
+      // Negative numbers use all ten bytes; below -2^53 a few low bits are lost, which affects no field that is read
+      // here.
       if (byte < 128) return { value: i === 9 ? value - 2 ** 64 : value, end: at + 1 };
     }
     throw this.#corrupt('a number of more than ten bytes');

@@ -19,10 +19,10 @@ import { FieldCursor } from './protobuf.js';
 
 /** Longest value of `metadata_props` that is read, in bytes. */
 const METADATA_LIMIT = 2 ** 22;
-/** Fields that a file may make this reader step through: about a second of work. */
+/** Maximum number of fields in a file: about a second of work. */
 const FIELD_LIMIT = 10_000_000;
 
-/** What has been read so far. Each step reads one field into it or, if bytes are missing, leaves it untouched. */
+/** State of the parse. Each step adds one field or, if bytes are missing, leaves it unchanged. */
 interface Draft {
   irVersion: number;
   producerName: string;
@@ -44,13 +44,13 @@ interface Draft {
 }
 
 /**
- * Reads what an ONNX file says about itself: inputs, outputs, opsets, metadata, operators, external files. Weights are
- * passed over: of a file of hundreds of megabytes over HTTP Range, two requests fetch the beginning and the end, plus one
+ * Reads the description of an ONNX file: inputs, outputs, opsets, metadata, operators, external files. Weights are
+ * skipped: for a file of hundreds of megabytes over HTTP Range, two requests fetch the beginning and the end, plus one
  * for every tensor between that is larger than the source's `chunk`.
  *
- * @throws GaussianSplatError `decode/html`, `decode/lfs-pointer` and `decode/unknown-format` for files that are something
- * else, `decode/truncated` and `decode/corrupt` for damaged ones, `decode/unsupported` for the format ORT and for files
- * of absurd size; and what the source throws.
+ * @throws GaussianSplatError `decode/html`, `decode/lfs-pointer` and `decode/unknown-format` for files of other kinds,
+ * `decode/truncated` and `decode/corrupt` for damaged ones, `decode/unsupported` for the format ORT and for implausibly
+ * large files; also errors of the source.
  */
 export async function readOnnxHeader(source: ByteSource): Promise<OnnxHeader> {
   const head = await source.read(0, Math.min(SIGNATURE_BYTES, source.size));
@@ -87,7 +87,7 @@ const emptyDraft = (): Draft => ({
   initializerBytes: 0,
 });
 
-/** Every exporter writes the IR version first; random bytes hardly ever give a plausible one. */
+/** Every exporter writes the IR version first; random bytes rarely contain a plausible one. */
 const looksLikeModel = ({ irVersion }: Draft): boolean => irVersion >= 1 && irVersion < 100;
 
 async function readModel(bytes: LoadedBytes, draft: Draft): Promise<void> {
@@ -105,9 +105,9 @@ async function readModel(bytes: LoadedBytes, draft: Draft): Promise<void> {
 }
 
 /**
- * Steps through a message and reads each field; a field whose bytes are not in memory yet is read again once they are.
- * @param read returns true to stop behind the field.
- * @returns true if it was stopped, false at the end of the message.
+ * Iterates over a message and reads each field; a field whose bytes are not in memory yet is read again once they are.
+ * @param read Returns true to stop after the field.
+ * @returns True if it was stopped, false at the end of the message.
  */
 async function readFields(bytes: LoadedBytes, field: FieldCursor, read: () => boolean | void): Promise<boolean> {
   let isPending = false;

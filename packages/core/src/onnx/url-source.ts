@@ -5,13 +5,16 @@ import { type ByteSource } from './byte-source.js';
 export interface UrlSourceOptions {
   /** `cors` (default) or `same-origin`. */
   readonly mode?: 'cors' | 'same-origin';
-  /** Which cookies are sent; default `same-origin`. */
+  /** Cookies policy of requests; default `same-origin`. */
   readonly credentials?: 'omit' | 'same-origin' | 'include';
   /** Aborts every request; reads then reject with the signal's reason. */
   readonly signal?: AbortSignal;
   /** Bytes of one Range request; default 65,536. */
   readonly chunk?: number;
-  /** Range requests before the rest is fetched as a whole; default 32. Many small requests take longer than one large. */
+  /**
+   * Maximum number of Range requests before the rest is fetched at once; default 32. Many small requests take longer
+   * than one large.
+   */
   readonly maxRequests?: number;
 }
 
@@ -21,22 +24,23 @@ export interface UrlSource extends ByteSource {
   readonly requests: number;
   /** Bytes of bodies received until now. */
   readonly bytesReceived: number;
-  /** The whole file, where the server sent it whole: it need not be fetched again. */
+  /** The whole file, if the server sent it at once. */
   readonly whole: Uint8Array | undefined;
 }
 
 const DEFAULT_CHUNK = 65_536;
 const DEFAULT_MAX_REQUESTS = 32;
-/** Answers by which servers refuse the Range header rather than the file. */
+/** Status codes of servers that reject the Range header rather than the file. */
 const RANGE_REFUSALS = [400, 405, 412, 416, 501];
 
 /**
- * Opens a file on a server for reading in pieces by HTTP Range; where the server or the browser refuses Range, the file is
- * fetched whole. A server that does not answer for 30 s is given up; a connection on which less than 1 KiB comes in 30 s counts as broken.
+ * Opens a file on a server for reading by HTTP Range; if the server or the browser rejects Range, the whole file is
+ * fetched. A server that does not respond for 30 s is abandoned; a connection with less than 1 KiB in 30 s counts as
+ * broken.
  *
- * @param url absolute, or relative to the page.
- * @throws GaussianSplatError `network/url`, `network/unreachable`, `network/status` or `network/interrupted`; the reason of
- * the signal.
+ * @param url Absolute, or relative to the page.
+ * @throws GaussianSplatError `network/url`, `network/unreachable`, `network/status` or `network/interrupted`; the
+ * reason of the signal.
  */
 export async function openUrl(url: string | URL, options: UrlSourceOptions = {}): Promise<UrlSource> {
   const file = new RemoteFile(parseUrl(url), options);
@@ -54,7 +58,7 @@ class RemoteFile implements UrlSource {
   bytesReceived = 0;
   size = 0;
   whole: Uint8Array | undefined;
-  /** The first piece, which opening the file brought along. */
+  /** The first range, from opening the file. */
   #head: Uint8Array | undefined;
 
   constructor(address: URL, options: UrlSourceOptions) {
@@ -87,25 +91,25 @@ class RemoteFile implements UrlSource {
     return this.whole!.subarray(offset, end);
   }
 
-  /** One piece, or undefined where the file should rather be fetched whole. */
+  /** Fetches one range; undefined if the whole file should be fetched. */
   async #fetchPiece(offset: number, end: number): Promise<Uint8Array | undefined> {
     if (this.requests >= this.#maxRequests) return undefined;
     const response = await this.#requestRange(offset, end);
     if (response === undefined) return undefined;
     const total = sizeFromContentRange(response);
     const piece = await this.#body(response);
-    // Another length means that the file was replaced meanwhile, or that a proxy answers with something else.
+    // Another length means that the file was replaced meanwhile, or that a proxy responds with other content.
     return piece.length === end - offset && (total ?? this.size) === this.size ? piece : undefined;
   }
 
-  /** The answer to a Range request; undefined if Range is refused; the whole file is kept if the server sends that. */
+  /** The response to a Range request; undefined if Range is rejected; the whole file is kept if the server sends it. */
   async #requestRange(offset: number, end: number): Promise<Response | undefined> {
     let response: Response;
     try {
       response = await this.#request({ headers: { Range: `bytes=${offset}-${end - 1}` } });
     } catch (error) {
       this.#options.signal?.throwIfAborted();
-      // Where Range is not on a browser's safe list, it asks the other origin first, and many refuse.
+      // If Range is not safelisted, the browser sends a preflight request, which many servers reject.
       const isSilent = error instanceof GaussianSplatError && error.cause instanceof SilenceError;
       if (error instanceof GaussianSplatError && error.code === 'network/unreachable' && !isSilent) return undefined;
       throw error;
@@ -120,7 +124,7 @@ class RemoteFile implements UrlSource {
     throw this.#badStatus(response);
   }
 
-  /** Across origins Content-Range is often hidden from scripts; Content-Length is not. */
+  /** Cross-origin, Content-Range is often hidden from scripts, but Content-Length is not. */
   async #sizeByHead(): Promise<number | undefined> {
     const response = await this.#request({ method: 'HEAD' });
     const length = response.headers.get('Content-Length');
@@ -192,7 +196,7 @@ function sizeFromContentRange(response: Response): number | undefined {
   return match ? Number(match[1]) : undefined;
 }
 
-/** Lengths and ranges of an encoded transfer are not those of the file. */
+/** Lengths and ranges of an encoded transfer differ from those of the file. */
 function isPlain(response: Response): boolean {
   return /^\s*(identity)?\s*$/i.test(response.headers.get('Content-Encoding') ?? '');
 }

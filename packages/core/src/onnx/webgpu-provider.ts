@@ -2,24 +2,27 @@ import { GraphValues } from './graph-values.js';
 import type { OnnxDtype, OnnxHeader, OnnxNode } from './header.js';
 import { WEBGPU_RULES as RULES } from './webgpu-rules.js';
 
-/** Types that no cast of onnxruntime-web's builds with WebGPU (1.30.0, JSPI and Asyncify) reads or writes, on the CPU either: no session can be made. */
+/**
+ * Types that no Cast of onnxruntime-web's builds with WebGPU (1.30.0, JSPI and Asyncify) reads or writes, not even on
+ * the CPU, so that no session can be created.
+ */
 const UNCASTABLE: readonly OnnxDtype[] = ['uint16', 'int16', 'float64'];
 
 /**
- * One reason why a file will not stay on the GPU (`fallback`), not run there (`failure`), compute other numbers there than on the CPU
- * (`wrong`), lose digits there for some inputs (`inexact`), or be slow.
+ * A reason that part of a file will not stay on the GPU (`fallback`), fail there (`failure`), compute wrong numbers
+ * there (`wrong`), lose precision there for some inputs (`inexact`), or be slow.
  */
 export interface GpuFinding {
   readonly kind: 'fallback' | 'failure' | 'wrong' | 'inexact' | 'slow';
-  /** The operator; `file`, `shape` or `type` where it is none. */
+  /** The operator; `file`, `shape` or `type` if there is none. */
   readonly operator: string;
-  /** The tensor that the node writes first, or that is meant. */
+  /** The first output of the node, or the affected tensor. */
   readonly tensor: string;
   readonly reason: string;
   readonly remedy: string;
 }
 
-/** A convolution whose weights are known. */
+/** A convolution with known weights. */
 export interface Convolution {
   readonly inputs: number;
   readonly outputs: number;
@@ -28,7 +31,7 @@ export interface Convolution {
   readonly group: number;
 }
 
-/** Types among a file's casts that pages cannot cast; and bfloat16, which they do not even store. */
+/** Types in a file's casts that browsers cannot cast, and bfloat16, which they cannot even store. */
 export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
   const values = new GraphValues(header);
   const used = new Set<OnnxDtype | undefined>();
@@ -40,9 +43,9 @@ export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
 }
 
 /**
- * Convolutions that ONNX Runtime's WebGPU provider computes wrongly, without a word (onnxruntime-web 1.30.0, onnxruntime-webgpu 1.27.0;
- * tests/generator/browser/provider.lab.test.ts tries whether it still does). The list saves the time of finding out: what a model writes on the
- * GPU is compared with what it writes on the CPU in any case.
+ * Convolutions that ONNX Runtime's WebGPU provider computes wrongly without an error (onnxruntime-web 1.30.0,
+ * onnxruntime-webgpu 1.27.0; tests/generator/browser/provider.lab.test.ts checks whether it still does). The list saves
+ * the time of a failed check: outputs on the GPU are compared with those on the CPU in any case.
  */
 export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {
   const values = new GraphValues(header);
@@ -52,7 +55,10 @@ export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {
   });
 }
 
-/** One or two dimensions, one group; 6, 9, 15, 18 ... channels, a multiple of 3 that is none of 4, to a multiple of 4; not one pixel at a time. */
+/**
+ * One or two dimensions, one group; from 6, 9, 15, 18 ... channels, a multiple of 3 but not of 4, to a multiple of 4;
+ * not pointwise.
+ */
 function isMiscomputed({ inputs, outputs, kernel, strides, group }: Convolution): boolean {
   const isPointwise = [...kernel, ...strides].every((size) => size === 1);
   const isPlane = kernel.length === 1 || kernel.length === 2;
@@ -73,8 +79,9 @@ function convolutionOf(
 }
 
 /**
- * Products that ONNX Runtime's optimiser makes another of (onnxruntime 1.30 and 1.31, CPU): a turned matrix times a vector, as in the place of a
- * camera, loses its transposition when both become one operator. Sessions of such files are made without fusions.
+ * Products that ONNX Runtime's optimizer fuses wrongly (onnxruntime 1.30 and 1.31, CPU): a transposed matrix times a
+ * vector, as in a camera position, loses its transposition in the fusion. Sessions of such files are created without
+ * fusions.
  */
 export function misfusedProducts(header: OnnxHeader): string[] {
   const values = new GraphValues(header);
@@ -87,7 +94,7 @@ const isMisfused = ({ operator, inputs }: OnnxNode, values: GraphValues): boolea
   !values.isConstant(inputs[0]) &&
   values.dimsOf(inputs[1])?.length === 1;
 
-/** Outputs that are the same in every run: they hang on constants alone. */
+/** Outputs that are equal in every run because they depend only on constants. */
 export function constantOutputs(header: OnnxHeader): Set<string> {
   const values = new GraphValues(header);
   return new Set(header.outputs.map(({ name }) => name).filter((name) => values.isConstant(name)));
@@ -95,26 +102,29 @@ export function constantOutputs(header: OnnxHeader): Set<string> {
 
 type Rule = (node: OnnxNode, opset: number, values: GraphValues, header: OnnxHeader) => Iterable<GpuFinding>;
 
-/** Everything that would keep a file from running wholly on the GPU with its commands recorded; none if nothing. The exporter's `gpu_findings` are these rules, too. */
+/**
+ * Everything that would keep a file from running entirely on the GPU with graph capture; empty if nothing does. The
+ * exporter's `gpu_findings` applies the same rules.
+ */
 export function gpuFindings(header: OnnxHeader): GpuFinding[] {
   const values = new GraphValues(header);
   const opset = header.opsets.get('ai.onnx') ?? 0;
   const found = [...ofFile(header, opset)];
   for (const node of header.nodes) {
-    // What hangs on constants alone is computed once, when the session is made.
+    // Nodes that depend only on constants run once, when the session is created.
     if (node.isInner || values.isFolded(node)) continue;
     for (const rule of NODE_RULES) found.push(...rule(node, opset, values, header));
   }
   return [...found, ...ofCopies(header, values)];
 }
 
-/** The findings for readers: sentences without a full stop. */
+/** The findings for display: sentences without a full stop. */
 export function gpuNotes(header: OnnxHeader): string[] {
   const notes = gpuFindings(header).map(({ kind, operator, tensor, reason, remedy }) => {
     const what = ['file', 'shape', 'type'].includes(operator) ? '' : `${operator} (${tensor}): `;
     return `${kind}: ${what}${reason}; ${remedy}`;
   });
-  // Of the same operator many times, once is enough.
+  // One finding is enough for repeated uses of an operator.
   return notes.filter((note, i) => notes.findIndex((other) => withoutTensor(other) === withoutTensor(note)) === i);
 }
 
@@ -155,8 +165,8 @@ function* ofFile(header: OnnxHeader, opset: number): Iterable<GpuFinding> {
 }
 
 /**
- * Outputs that are another shape of a result: no kernel writes them. A file without inputs runs once and is none the worse for it; what is
- * constant is read once, and the rest recorded.
+ * Outputs that are views of another result, which no kernel writes. A file without inputs runs once and is unaffected;
+ * constants are read once, and the rest is captured.
  */
 function* ofCopies({ inputs, outputs }: OnnxHeader, values: GraphValues): Iterable<GpuFinding> {
   for (const { name: tensor } of inputs.length > 0 ? outputs : []) {
@@ -208,7 +218,7 @@ const typeRule: Rule = function* (node, _, values) {
   const { operator, inputs, outputs } = node;
   const isWide = (name: string): boolean => ['int64', 'float64'].includes(values.dtypeOf(name) ?? '');
   let wide = [...inputs, ...outputs].filter((name) => name !== '' && !values.isConstant(name) && isWide(name));
-  // Indices of Gather and its kin may be int64, and a Cast may make them; anything else is arithmetic.
+  // Indices of Gather and similar operators may be int64, and a Cast may produce them; everything else is arithmetic.
   if ((RULES.makers as readonly string[]).includes(operator)) wide = wide.filter((name) => inputs.includes(name));
   else if ((RULES.indexed as readonly string[]).includes(operator)) {
     wide = wide.filter((name) => name === inputs[0] || name === outputs[0]);

@@ -1,9 +1,10 @@
 /**
- * What ONNX Runtime's WebGPU provider can and cannot do, as data: the rules of this checker and of the Python exporter's, which has a copy
- * (`node scripts/write-webgpu-rules.mjs`). Measured operator by operator with onnxruntime-webgpu 1.27.0 and onnxruntime-web 1.30.0.
+ * Capabilities of ONNX Runtime's WebGPU provider, as data: the rules of this checker and of the Python exporter, which
+ * has a copy (`node scripts/write-webgpu-rules.mjs`). Measured for each operator with onnxruntime-webgpu 1.27.0 and
+ * onnxruntime-web 1.30.0.
  */
 export const WEBGPU_RULES = {
-  /** Operators of ONNX itself that have a kernel for float32, or none to need. */
+  /** Operators of ONNX itself that have a kernel for float32, or need none. */
   kernels:
     `Abs Acos Acosh Add And ArgMax ArgMin Asin Asinh Atan Atanh AveragePool BatchNormalization Cast Ceil Clip Concat Constant Conv ConvTranspose Cos
     Cosh CumSum DepthToSpace Div Einsum Elu Equal Erf Exp Expand Flatten Floor Gather GatherElements GatherND Gelu Gemm GlobalAveragePool
@@ -13,7 +14,7 @@ export const WEBGPU_RULES = {
     Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Trilu Unsqueeze Where`.split(
       /\s+/,
     ),
-  /** What to write instead of operators that people use in generators. */
+  /** Replacements for operators that are common in generators. */
   instead: {
     Compress: 'keep every row and write opacity 0 into the dead ones',
     NonZero: 'keep every row and write opacity 0 into the dead ones',
@@ -31,26 +32,29 @@ export const WEBGPU_RULES = {
   } as Readonly<Record<string, string>>,
   /** Operators of com.microsoft that have a kernel. */
   contrib: ['MultiHeadAttention', 'SkipLayerNormalization', 'SkipSimplifiedLayerNormalization'],
-  /** Operators whose kernel computes other numbers than the CPU does. */
+  /** Operators whose kernel computes other numbers than the CPU. */
   miscomputed: {
     MultiHeadAttention: 'WebGPU computes it wrongly for more than one query, so the whole model runs on the CPU',
   } as Readonly<Record<string, string>>,
-  /** Operators that compute a variance as the mean of squares less the square of the mean. */
+  /** Operators that compute a variance as the mean of squares minus the square of the mean. */
   inexact: ['InstanceNormalization', 'LayerNormalization', 'SkipLayerNormalization'],
   controlFlow: ['If', 'Loop', 'Scan'],
-  /** Their results are another shape of what they take: no kernel writes an output that one of them makes. */
+  /** Operators whose outputs are views of their input, so that no kernel writes them. */
   aliases: ['Reshape', 'Squeeze', 'Unsqueeze', 'Flatten', 'Identity'],
-  /** 64-bit integers may come into these without a kernel for them: {@link makers} of some, and as indices. */
+  /**
+   * Operators that accept 64-bit integers without a kernel: {@link makers} produce them, and {@link indexed} use them
+   * as indices.
+   */
   makers: ['Cast', 'ArgMax', 'ArgMin', 'TopK', 'Shape'],
   indexed: ['Gather', 'GatherElements', 'GatherND', 'ScatterND', 'ScatterElements'],
   newestOpset: 26,
   newestIr: 13,
   /** The last opset whose GridSample has a kernel. */
   gridSampleOpset: 19,
-  /** A Split binds a buffer for its input and one for each output; some adapters have 10 for a shader. */
+  /** A Split binds a buffer for its input and one for each output; some adapters have 10 for each shader. */
   mostSplitOutputs: 9,
-  /** CumSum lets each thread add up its whole prefix. */
+  /** CumSum lets each thread sum its whole prefix. */
   longestCumSum: 4096,
-  /** What opset to export for which everything above is right. */
+  /** Export opset for which all rules above hold. */
   exportOpset: 18,
 } as const;

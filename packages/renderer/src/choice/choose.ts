@@ -5,20 +5,20 @@ import { keyFor, pageStore, readChoice, writeChoice, type AutotuneStore } from '
 import type * as trials from './trials.js';
 
 export interface AutotuneOptions {
-  /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
+  /** Default: the `localStorage` of the page, if it has one. null: no storage. */
   readonly store?: AutotuneStore | null;
-  /** Awaited before each piece of the work, for pages that have something better to do at times. */
+  /** Awaited before each step of the work, for pages that have more urgent work. */
   readonly pause?: () => Promise<void>;
-  /** Of the frames to come: what they need is made at the same time. */
+  /** Format of the frames to come: their pipelines are compiled at the same time. */
   readonly format?: GPUTextureFormat;
 }
 
 export interface StartOptions extends AutotuneOptions {
-  /** Milliseconds that a small frame of what is likely to suit a GPU may take there; default 8. */
+  /** Upper limit in milliseconds of a small frame with the preferred variants; default 8. */
   readonly quickMs?: number;
 }
 
-/** What is under way for a device, or done. */
+/** Autotuning of one device, running or finished. */
 interface Choice {
   started?: Promise<Variants>;
   chosen?: Promise<Variants>;
@@ -26,18 +26,18 @@ interface Choice {
 
 const choiceOf = (device: GPUDevice): Choice => perDevice(device, 'choice', () => ({}));
 
-/** GPUMapMode.READ, which Node has only where Dawn was loaded. */
+/** GPUMapMode.READ, which Node defines only if Dawn is loaded. */
 const MAP_READ = 1;
 
 const QUICK_MS = 8;
 
-/** The self-test, which comes while the bytes of a scene are on their way. */
+/** The self-test, loaded while the bytes of a scene are in transit. */
 const loadTrials = (): Promise<typeof trials> => loadModule('the self-test of the GPU', () => import('./trials.js'));
 
 /**
- * Finds variants with which a first frame can be drawn soon, once for each device: those that an earlier visit chose; else what is likely to suit a
- * GPU, if it passes the self-test and is quick enough; else what {@link autotune} takes seconds to find, which a page with a likely one
- * may ask for later, when it is at rest.
+ * Finds variants for an early first frame, once for each device: the stored ones of an earlier visit; else the variants
+ * that most GPUs prefer, if they pass the self-test and are fast enough; else the result of {@link autotune}, which
+ * takes seconds. A page that got preferred variants may autotune later, at rest.
  * @throws GaussianSplatError as {@link autotune}
  */
 export function startVariants(device: GPUDevice, options: StartOptions = {}): Promise<Variants> {
@@ -56,10 +56,12 @@ async function start(device: GPUDevice, options: StartOptions, choice: Choice): 
 }
 
 /**
- * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a self-test are out, the
- * others are timed on small scenes. Viewpoints made after that draw their `auto` settings with them; before, with what was chosen on the device on an earlier visit, or else `quads`,
- * `rgba16float` and `parallel`, which work everywhere. Takes about a second the first time on an adapter, most of it to compile what is not chosen in the end; then the choice is kept in `store`, and
- * only its answer is checked again. What it took is in the performance timeline, as `gaussian-splat.search`; of that, `detail.paused` milliseconds were pauses.
+ * Finds the fastest variants that draw the right image on a device, once for each device: variants that fail the
+ * self-test are excluded, the others are timed on small scenes. Viewpoints created afterwards use the result for `auto`
+ * settings; earlier ones use the stored result of a previous visit, or else `quads`, `rgba16float` and `parallel`,
+ * which work everywhere. Takes about a second the first time on an adapter, most of it to compile variants that are not
+ * chosen; then the result is kept in `store`, and only its self-test is repeated. The duration is in the performance
+ * timeline as `gaussian-splat.search`, of it `detail.paused` milliseconds of pauses.
  * @throws GaussianSplatError `unsupported/wrong-image` if no variant passes the self-test.
  */
 export function autotune(device: GPUDevice, options: AutotuneOptions = {}): Promise<Variants> {
@@ -73,7 +75,7 @@ async function choose(device: GPUDevice, options: AutotuneOptions): Promise<Vari
     kept !== undefined && (await (await loadTrials()).isRight(device, kept, format))
       ? kept
       : await search(device, pause);
-  // What a device answered while it was lost says nothing about the adapter, whose other devices would go by it.
+  // Results of a lost device say nothing about the adapter, so they are not stored for its other devices.
   if (!(await isAlive(device))) return SAFE;
   remember(device, variants);
   writeChoice(store, keyFor(device), variants);
@@ -81,10 +83,10 @@ async function choose(device: GPUDevice, options: AutotuneOptions): Promise<Vari
 }
 
 async function noPause(): Promise<void> {
-  // Nothing else is to be done.
+  // A failed compilation needs no handling here.
 }
 
-/** Loaded when it runs: most visits know what suits their device. */
+/** Loaded on demand, because most visits find a stored result. */
 async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Variants> {
   const detail = { paused: 0 };
   const timedPause = async (): Promise<void> => {
@@ -99,14 +101,14 @@ async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Va
     );
     const found = await searchVariants(device, timedPause);
     if (found) return found;
-    // A wrong picture is worse than none. A lost device draws none, and says so itself.
+    // A wrong image is worse than none. A lost device draws none, and reports its own error.
     if (!(await isAlive(device))) return SAFE;
     throw wrongImage(device);
   };
   return measured('search', find, detail);
 }
 
-/** Notes in the performance timeline, as `gaussian-splat.NAME`, what a part of the choice took. */
+/** Records the duration of a step in the performance timeline, as `gaussian-splat.NAME`. */
 async function measured<T>(name: string, work: () => Promise<T>, detail?: object): Promise<T> {
   const start = performance.now();
   try {
@@ -116,7 +118,7 @@ async function measured<T>(name: string, work: () => Promise<T>, detail?: object
   }
 }
 
-/** Whether a device still answers, and so did before: one that is lost stays lost. */
+/** Whether a device still works: a lost one stays lost. */
 async function isAlive(device: GPUDevice): Promise<boolean> {
   const buffer = device.createBuffer({ label: 'gs.probe.alive', size: 4, usage: BUFFER_USAGE.mapRead });
   try {

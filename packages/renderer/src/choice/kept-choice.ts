@@ -1,32 +1,32 @@
 import type { Variants } from '../variants.js';
 
-/** Where a choice is kept between visits: `localStorage`, or anything like it. */
+/** Storage of autotuning results between visits: `localStorage`, or an object with the same methods. */
 export interface AutotuneStore {
   getItem(key: string): string | null;
   setItem(key: string, value: string): void;
 }
 
-/** Changes whenever a variant does, so that old choices are made anew. */
+/** Incremented whenever a variant changes, to invalidate stored results. */
 const VERSION = 4;
 
-/** What a choice is kept under: the adapter and what it can do. */
+/** Storage key: the adapter and its capabilities. */
 export function keyFor(device: GPUDevice): string {
   const { vendor = '', architecture = '', device: model = '', description = '' } = device.adapterInfo ?? {};
   const features = [...device.features].sort().join(' ');
   return `gaussian-splat ${VERSION} ${[vendor, architecture, model, description].join(' ')} ${features}`;
 }
 
-/** Where pages keep theirs; null where they have or may use none. */
+/** The default storage of a page; null if it has none or may not use it. */
 export function pageStore(): AutotuneStore | null {
   try {
     return (globalThis as { localStorage?: AutotuneStore }).localStorage ?? null;
   } catch {
-    // A page may be denied its storage.
+    // The page may be denied its storage.
     return null;
   }
 }
 
-/** The choice of an earlier visit; undefined where there is none that this device can have. */
+/** Returns the result of an earlier visit; undefined if there is none that this device supports. */
 export function readChoice(store: AutotuneStore | null, device: GPUDevice): Variants | undefined {
   try {
     const { rasterizer, accumulation, threads } = JSON.parse(
@@ -46,6 +46,6 @@ export function writeChoice(store: AutotuneStore | null, key: string, variants: 
   try {
     store?.setItem(key, JSON.stringify(variants));
   } catch {
-    // A full or forbidden store costs the next visit its own search.
+    // If the storage is full or forbidden, the next visit searches again.
   }
 }

@@ -11,31 +11,34 @@ import { World } from '../world.js';
 import { sumsAndSorts } from './stages-alone.js';
 import type { ShPrecision } from '../pack/words.js';
 
-/** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
+/** Maximum error of a pixel: float16 blending stays a tenth below it. */
 const TOLERANCE = 0.02;
-/** Mean squared error that the answer may have: that of 59 dB, to which pictures are right. Where blending into float16 truncates they are not. */
+/** Maximum mean squared error of the self-test, 59 dB PSNR: images that blend in a float16 that truncates exceed it. */
 const MOST_ERROR = 10 ** -5.9;
-/** Large splats that lie over much of the picture. */
+/** Number of large splats, which cover much of the image. */
 const LARGE = 24;
-/** Small ones, so many that each stage has several workgroups, the last of them not full, and the sort two blocks. A third is outside the picture. */
+/**
+ * Number of small splats: each stage has several workgroups, the last of them partly filled, and the sort has two
+ * blocks. A third of the splats is outside the image.
+ */
 const SMALL = 4_500;
-/** Several bins of the tiles, none of which fits. */
+/** Several bins of tiles in each direction, the last of them partly outside. */
 const [WIDTH, HEIGHT] = [276, 136];
-/** Of frames in motion and of frames at rest: shares of the visible range of depths, and depths. */
+/** Key widths in motion (a fraction of the visible depth range) and at rest (depths). */
 const KEY_BITS = [16, 32] as const;
-/** Milliseconds after which the reference lets other tasks of the page run. */
+/** Milliseconds after which the reference yields to other tasks of the page. */
 const SLICE_MS = 6;
 const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 
-/** True if a renderer with these options draws the image that the mathematics ask for: of two scenes, whose splats lie among one another. */
+/** Whether a renderer with these options draws the exact image of two scenes with interleaved splats. */
 export const givesKnownAnswer = async (device: GPUDevice, options: FrameSettings): Promise<boolean> =>
   (await faultOf(device, options)) === undefined;
 
-/** What a renderer with these options computes wrongly, for readers; undefined where all is right. */
+/** Describes the first error that a renderer with these options makes; undefined if the result is right. */
 export async function faultOf(device: GPUDevice, options: FrameSettings): Promise<string | undefined> {
   const threads = options.threads === 'serial' ? 'serial' : 'parallel';
   if (!(await sumsAndSorts(device, threads))) return `${threads} prefix sums or the ${threads} sort`;
-  // Each step is a task of its own: a page that starts has frames to show meanwhile.
+  // Each step is a task of its own, because a page that starts has frames to show meanwhile.
   await turn();
   const clouds = [sphereCloud(LARGE, 0.8), sphereCloud(SMALL, 0.08, 2.4)];
   const camera = shearedCamera(WIDTH, HEIGHT);
@@ -58,12 +61,12 @@ export async function faultOf(device: GPUDevice, options: FrameSettings): Promis
   }
 }
 
-/** Whether no pixel is far off, and those that are covered are as near as pictures are to be. */
+/** Whether no pixel has a large error, and the covered ones are accurate on average. */
 function isNear(pixels: Float32Array, expected: Float64Array): boolean {
   let [sum, covered] = [0, 0];
   for (let i = 0; i < pixels.length; i++) {
     const error = Math.abs(pixels[i] - expected[i]);
-    // Not a number is far off, too.
+    // NaN fails the comparison, too.
     if (!(error <= TOLERANCE)) return false;
     sum += error * error;
     if (expected[i | 3] > 0) covered++;
@@ -71,21 +74,21 @@ function isNear(pixels: Float32Array, expected: Float64Array): boolean {
   return sum <= MOST_ERROR * covered;
 }
 
-/** A viewpoint of these scenes alone. */
+/** A viewpoint of these scenes only. */
 export function viewpointOf(device: GPUDevice, scenes: readonly GaussianScene[], settings: FrameSettings): Viewpoint {
   const world = new World();
   for (const scene of scenes) world.add({ scene });
   return new Viewpoint(device, world, { settings });
 }
 
-/** A camera that looks at the spheres askew, so that a transposed matrix shows. */
+/** A camera at an oblique angle, so that a transposed matrix is detected. */
 export function probeCamera(width: number, height: number): Camera {
   const worldToCamera = lookAt([1.2, -0.8, -2.6], [0.1, 0.05, 0], [0.1, -1, 0.2]);
   const focal = 1.1 * width;
   return { width, height, fx: focal, fy: focal, cx: width / 2, cy: height / 2, worldToCamera, near: 0.2, far: 100 };
 }
 
-/** The same, sheared: spheres become leaning ellipses, so that a lost slope shows, too. */
+/** The same camera, sheared: spheres become slanted ellipses, so that a lost slope is detected, too. */
 function shearedCamera(width: number, height: number): Camera {
   const camera = probeCamera(width, height);
   const shear = [1, 0.7, 0, 0, 0, 0.6, 0.2, 0, 0, 0, 1, 0, 0, 0, 0, 1];
@@ -93,8 +96,8 @@ function shearedCamera(width: number, height: number): Camera {
 }
 
 /**
- * Splats that are spheres, of random place, size, opacity and view-dependent colour; the same on every machine.
- * @param side of the cube that their centers lie in
+ * Spheres of random position, size, opacity and view-dependent color; the same on every machine.
+ * @param side Side of the cube around their centers.
  */
 export function sphereCloud(count: number, size: number, side = 1.6): GaussianCloud {
   let state = 1;
@@ -117,8 +120,9 @@ export function sphereCloud(count: number, size: number, side = 1.6): GaussianCl
 }
 
 /**
- * What `packGaussians` makes of spheres, all of which can be drawn: every page carries this, and its checks of strangers' clouds only where files are read.
- * @param order of the splats; `packGaussians` has that of `mortonOrder`
+ * Packs valid spheres as `packGaussians` does. The base bundle contains this function; the checks of untrusted clouds
+ * are loaded only with a file reader.
+ * @param order Order of the splats; `packGaussians` uses that of `mortonOrder`.
  */
 export function packSpheres(
   cloud: GaussianCloud,
@@ -139,7 +143,7 @@ export function packSpheres(
 }
 
 /**
- * The image in float64, front to back: spheres have closed forms where other splats need matrices. Other tasks of the page run every
+ * Computes the image in float64, front to back: spheres have closed forms. Yields to other tasks of the page every
  * {@link SLICE_MS}.
  */
 async function drawSpheres(clouds: readonly GaussianCloud[], camera: Camera): Promise<Float64Array> {
@@ -205,7 +209,7 @@ function projectSphere(
   const [px, py, pz] = [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]];
   const along = (row: number): number => m[row] * px + m[row + 1] * py + m[row + 2] * pz + m[row + 3];
   const [x, y, z] = [along(0), along(4), along(8)];
-  // The Jacobian follows a centre to 1.3 times the edge of the image, which is centred here.
+  // The Jacobian is clamped at 1.3 times the edge of the image, whose principal point is the center here.
   const [tx, ty] = [clamp(x / z, (0.65 * width) / fx), clamp(y / z, (0.65 * height) / fy)];
   const [acrossScale, downScale] = [(fx * scales[3 * i]) / z, (fy * scales[3 * i]) / z];
   let [xx, xy, yy] = [DILATION, 0, DILATION];

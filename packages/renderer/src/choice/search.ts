@@ -1,4 +1,4 @@
-/** The search for what a device is served best with: a second of trials, once for each adapter and origin. */
+/** The autotuning search: a second of trials, once for each adapter and origin. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { mortonOrder } from '../pack/morton.js';
 import type { PackedGaussians } from '../pack/pack.js';
@@ -6,34 +6,34 @@ import { LIKELY, SAFE, type Variants } from '../variants.js';
 import { packSpheres, sphereCloud } from './known-answer.js';
 import { FrameClock, FRAMES, isRight, timeFrames, type Trial } from './trials.js';
 
-/** Until one candidate is left, or the time is up. */
+/** Rounds run until one candidate is left, or the time is up. */
 export const ROUNDS: readonly Trial[] = [
   { scene: () => spheres(1), width: 320, height: 180 },
   { scene: () => spheres(16), width: 1920, height: 1080 },
 ];
-/** Spheres of a scene: packing more of them would hold up the page. */
+/** Spheres of a scene: packing more of them would block the main thread. */
 const SPHERES = 4_096;
-/** Milliseconds that all rounds may take, and how much longer than the last one the next is expected to be. */
+/** Milliseconds for all rounds, and the expected ratio of one round's duration to the previous one's. */
 const BUDGET = 800;
 const GROWTH = 16;
-/** A candidate so much slower than the fastest, in a round that takes as long as is worth measuring, is out. */
+/** A candidate slower than the fastest by this factor is excluded, in a round of at least MEASURABLE ms. */
 const HOPELESS = 1.5;
 const MEASURABLE = 1.5;
 
-/** What suits a processor in disguise: tiles are made of barriers, which it is worst at. Of float32 quads it has to convert nothing. */
+/** Variants for software adapters: tiles need barriers, which are slow there. float32 quads need no conversion. */
 const SERIAL: Variants = { ...SAFE, threads: 'serial' };
 const PRECISE: Variants = { ...SERIAL, accumulation: 'rgba32float' };
-/** Milliseconds of the smallest trial that no GPU takes. */
+/** Milliseconds of the smallest trial that no GPU exceeds. */
 const NO_GPU_MS = 60;
 type Pause = () => Promise<void>;
 
-/** The fastest variants that draw the right image on a device; undefined where none does. */
+/** Returns the fastest variants that draw the right image on a device; undefined if none does. */
 export async function searchVariants(device: GPUDevice, pause: Pause): Promise<Variants | undefined> {
   const processors = device.features.has('float32-blendable') ? [SERIAL, PRECISE] : [SERIAL];
   const likely = device.adapterInfo?.isFallbackAdapter ? processors : [LIKELY, SAFE];
   const candidates = await rightOf(device, likely, pause);
   const clock = await FrameClock.on(device);
-  // A processor that does not say that it is one.
+  // A software adapter that does not report itself as one.
   if (likely !== processors && !(await isQuick(device, candidates, clock)))
     candidates.push(...(await rightOf(device, processors, pause)));
   if (candidates.length > 0) return chooseFastest(device, candidates, clock, pause);
@@ -41,7 +41,7 @@ export async function searchVariants(device: GPUDevice, pause: Pause): Promise<V
   return undefined;
 }
 
-/** However slow, if they are right: what was no candidate for its speed. */
+/** Variants that are right, however slow: their speed excluded them before. */
 const LAST_RESORTS: readonly Variants[] = [LIKELY, SAFE, SERIAL, { ...LIKELY, threads: 'serial' }];
 
 async function rightOf(device: GPUDevice, candidates: readonly Variants[], pause: Pause): Promise<Variants[]> {
@@ -66,9 +66,9 @@ async function chooseFastest(
   let left = candidates.map((variants) => ({ variants, time: 0 }));
   let spent = 0;
   for (const round of ROUNDS) {
-    // Only what the GPU did counts: pipelines that had to be made first are of use later.
+    // Only GPU time counts: compiled pipelines are reused.
     const last = FRAMES * left.reduce((sum, { time }) => sum + time, 0);
-    // A clock of the page that stands still says of none how long it takes: the small round was enough.
+    // A clock that does not advance cannot compare candidates, so the small round decides.
     const isBlind = last === 0 && round !== ROUNDS[0];
     if (left.length === 1 || isBlind || spent + GROWTH * last > BUDGET) break;
     for (const candidate of left) {
@@ -83,7 +83,7 @@ async function chooseFastest(
   return left[0].variants;
 }
 
-/** That no variant draws the right image. */
+/** Error for a device on which no variant draws the right image. */
 export function wrongImage({ adapterInfo }: GPUDevice): GaussianSplatError {
   const { vendor = '', architecture = '', description = '' } = adapterInfo ?? {};
   return new GaussianSplatError('unsupported/wrong-image', {
@@ -94,7 +94,7 @@ export function wrongImage({ adapterInfo }: GPUDevice): GaussianSplatError {
   });
 }
 
-/** A scene of so many copies of the same spheres, one in the place of the other. */
+/** A scene of this many copies of the same spheres at the same positions. */
 function spheres(copies: number): PackedGaussians {
   const cloud = sphereCloud(SPHERES, Math.cbrt(400 / (copies * SPHERES)));
   const order = mortonOrder(

@@ -1,4 +1,4 @@
-/** Stages by themselves, with more to do than a small picture gives them. */
+/** Tests stages in isolation, with more data than a small image provides. */
 import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
@@ -6,14 +6,14 @@ import { SortStage } from '../stages/sort.js';
 import { planStage, scanBytes, type Threads } from '../stages/stage.js';
 
 const { DIGITS, SORT_BLOCK } = constants;
-/** So many that the sums over blocks are shared among threads; the last block is not full. */
+/** Number of blocks: the sums over blocks are divided among threads, and the last block is partly filled. */
 const BLOCKS = 19;
 const KEYS = BLOCKS * SORT_BLOCK - 100;
-/** More than a workgroup sums up in one step. */
+/** More than a workgroup sums in one step. */
 const COUNTS = 5_003;
 const WORD = 4;
 
-/** True if prefix sums and the sort of more numbers than a picture of the self-test has are right. */
+/** Whether prefix sums and sorting are right for more numbers than an image of the self-test has. */
 export async function sumsAndSorts(device: GPUDevice, threads: Threads): Promise<boolean> {
   const memory = new GpuMemory(device);
   const { storage, uniform, copySource, copyDestination, mapRead } = BUFFER_USAGE;
@@ -66,7 +66,7 @@ function planOf(keys: number): Uint32Array {
   return plan;
 }
 
-/** Strictly ascending by key and place: then each place is there once. */
+/** Strictly ascending by key and index, so every index occurs once. */
 const isOrder = (order: Uint32Array, keys: Uint32Array): boolean =>
   order.every((place, i) => {
     const [key, before] = [keys[place], keys[order[i - 1]]];

@@ -1,4 +1,4 @@
-/** What a device is asked before it draws for anybody: whether a variant is right, and how fast. */
+/** Tests of a device before its first frame: whether a variant is right, and how fast it is. */
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { QueueClock } from '../gpu/queue-clock.js';
@@ -8,10 +8,10 @@ import type { PackedGaussians } from '../pack/pack.js';
 import { faultsOf, type Variants } from '../variants.js';
 import { faultOf, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
 
-/** Frames of a trial. */
+/** Frames in one trial. */
 export const FRAMES = 4;
 
-/** A scene, and pixels of its images. */
+/** A scene, and the image size in pixels. */
 export interface Trial {
   readonly scene: () => PackedGaussians;
   readonly width: number;
@@ -19,8 +19,8 @@ export interface Trial {
 }
 
 /**
- * Whether a variant draws the known answer; found out once for each device.
- * @param format of the pictures to come: what they need is made meanwhile
+ * Whether a variant passes the self-test, cached for each device.
+ * @param format Format of the frames to come: their pipelines are compiled meanwhile.
  */
 export const isRight = (device: GPUDevice, variants: Variants, format?: GPUTextureFormat): Promise<boolean> =>
   perDevice(device, `right ${JSON.stringify(variants)}`, async () => {
@@ -31,33 +31,33 @@ export const isRight = (device: GPUDevice, variants: Variants, format?: GPUTextu
     return isKnown;
   });
 
-/** Asks for the pipelines of a first picture. */
+/** Starts compiling the pipelines of a first frame. */
 function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat): void {
   const renderer = new Viewpoint(device, new World(), { settings: variants });
   renderer.prepare([{}], format);
   renderer.destroy();
 }
 
-/** Whether an answer is right, and WebGPU had nothing to say against the way to it. */
+/** Whether a self-test passes without a WebGPU validation error. */
 export async function isValid(device: GPUDevice, answer: () => Promise<boolean>): Promise<boolean> {
   device.pushErrorScope('validation');
   const isAnswer = await answer().catch(() => false);
   return (await device.popErrorScope().catch(() => undefined)) === null && isAnswer;
 }
 
-/** What the known answer is drawn into. */
+/** Target of the self-test. */
 export const ANSWER_TARGET = { format: 'rgba32float', usage: TEXTURE_USAGE.renderAttachment } as const;
 
-/** What a canvas is like. */
+/** A target like that of a canvas. */
 const PAGE_TARGET = {
   format: 'rgba8unorm',
   usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.storageBinding,
 } as const;
 
-/** The smallest scene of the trials. */
+/** Smallest scene of the trials. */
 const SMALL: Trial = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 'int8'), width: 320, height: 180 };
 
-/** Whether a variant passes the self-test and draws a small frame within some milliseconds. */
+/** Whether a variant passes the self-test and draws a small frame within this many milliseconds. */
 export async function isGoodStart(
   device: GPUDevice,
   variants: Variants,
@@ -66,11 +66,11 @@ export async function isGoodStart(
 ): Promise<boolean> {
   if (!(await isRight(device, variants, format))) return false;
   const clock = await FrameClock.on(device);
-  // Into what the known answer was drawn into: nothing is compiled for this trial alone.
+  // Uses the target of the self-test, so that no pipeline is compiled for this trial alone.
   return (await timeFrames(device, variants, SMALL, clock, ANSWER_TARGET)) <= quickMs;
 }
 
-/** Milliseconds of each of a few frames in a row. */
+/** Milliseconds per frame over a few consecutive frames. */
 export async function timeFrames(
   device: GPUDevice,
   variants: Variants,
@@ -83,7 +83,7 @@ export async function timeFrames(
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
   const draw = (): void => renderer.draw(camera, { target: texture });
-  // The first frame also makes pipelines.
+  // The first frame also compiles pipelines.
   await clock.time(1, draw);
   const time = await clock.time(FRAMES, draw);
   texture.destroy();
@@ -92,7 +92,7 @@ export async function timeFrames(
   return time;
 }
 
-/** Times frames of which several are drawn in a row, the queue drained once. */
+/** Times several consecutive frames, with one wait for the queue. */
 export class FrameClock {
   readonly #clock: QueueClock;
 
@@ -106,7 +106,7 @@ export class FrameClock {
     this.#clock = clock;
   }
 
-  /** Milliseconds of each of `count` frames that `draw` submits. */
+  /** Milliseconds per frame of the `count` frames that `draw` submits. */
   async time(count: number, draw: () => void): Promise<number> {
     const begin = performance.now();
     for (let frame = 0; frame < count; frame++) draw();

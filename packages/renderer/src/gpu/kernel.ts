@@ -1,4 +1,4 @@
-/** What scripts/build-shaders.mjs says of one shader. */
+/** Description of one shader, from scripts/build-shaders.mjs. */
 export interface ShaderDescription {
   readonly name: string;
   readonly code: string;
@@ -8,14 +8,14 @@ export interface ShaderDescription {
 interface ShaderBinding {
   readonly binding: number;
   readonly type: 'uniform' | 'storage' | 'read-only-storage' | 'texture' | 'storage-texture';
-  /** Of a storage texture. */
+  /** Only for a storage texture. */
   readonly format?: GPUTextureFormat;
 }
 
 /** A resource for each binding of a shader, by its name in the WGSL. */
 export type Resources<S extends ShaderDescription> = Readonly<Record<keyof S['bindings'], Resource>>;
 
-/** A whole buffer, a part of one, or a texture view. */
+/** A whole buffer, a range of one, or a texture view. */
 export type Resource = GPUBuffer | GPUBufferBinding | GPUTextureView;
 
 /** The bind group layout and shader module of a shader on one device. */
@@ -64,12 +64,12 @@ function layoutEntry(
   }
 }
 
-/** Bare buffers are a recent addition to WebGPU: older browsers want them wrapped. */
+/** Bare buffers are a recent addition to WebGPU, so they are wrapped for older browsers. */
 function asBindingResource(resource: Resource): GPUBindingResource {
   return 'mapState' in resource ? { buffer: resource } : resource;
 }
 
-/** Values for `override`s of a shader, by their names there. */
+/** Values of the `override` constants of a shader, by their names. */
 export type Overrides = Readonly<Record<string, number>>;
 
 /** A compute shader that can be dispatched. Its entry point is `main`. */
@@ -88,7 +88,10 @@ export class ComputeKernel<S extends ShaderDescription> {
     this.#program = new ShaderProgram(device, shader, SHADER_STAGE.compute);
   }
 
-  /** Makes the pipeline, by far the dearest part, so that no frame has to; within {@link madeTogether} beside others. */
+  /**
+   * Compiles the pipeline, by far the most expensive part, so that no frame has to; concurrently with others within
+   * {@link madeTogether}.
+   */
   prepare(): this {
     const { together } = makingOn(this.#device);
     if (together && !this.#made) together.push((this.#making ??= this.#makeBeside()));
@@ -97,7 +100,7 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 
   async #makeBeside(): Promise<void> {
-    // What fails here fails again where it is used, and is told of there.
+    // A failure occurs again at the first use, and is reported there.
     const made = await this.#device.createComputePipelineAsync(this.#descriptor).catch(() => undefined);
     this.#made ??= made;
   }
@@ -115,7 +118,7 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 
   get #pipeline(): GPUComputePipeline {
-    // A frame cannot wait.
+    // A frame cannot wait, so it compiles synchronously.
     return (this.#made ??= this.#device.createComputePipeline(this.#descriptor));
   }
 
@@ -135,12 +138,12 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 }
 
-/** Pipelines that are being made beside one another. */
+/** Pipelines that are compiled concurrently. */
 const makingOn = (device: GPUDevice): { together?: Promise<void>[] } => perDevice(device, 'making', () => ({}));
 
 /**
- * Waits for the compute pipelines that `prepare` asks for, which the browser makes beside one another: one after the other they take a GPU's driver a second, in which the
- * browser shows nothing new of any page.
+ * Waits for the compute pipelines that `prepare` requests, which the browser compiles concurrently. In sequence they
+ * take a GPU driver a second, during which the browser updates no page.
  */
 export async function madeTogether(device: GPUDevice, prepare: () => void): Promise<void> {
   const making = makingOn(device);
@@ -157,12 +160,12 @@ export async function madeTogether(device: GPUDevice, prepare: () => void): Prom
 /** WebGPU's default limit of workgroups in one dimension (`MAX_GROUPS_X` in the shaders). */
 const MAX_GROUPS = 65535;
 
-/** Workgroups across and down for a number of them: the inverse of `group_index` of shaders/shared/group.wgsl. */
+/** Workgroups across and down for a total number: the inverse of `group_index` of shaders/shared/group.wgsl. */
 export function dispatchGrid(groups: number): [columns: number, rows: number] {
   return [Math.min(groups, MAX_GROUPS), Math.ceil(groups / MAX_GROUPS)];
 }
 
-/** `GPUShaderStage`, which does not exist where a module is merely imported. */
+/** `GPUShaderStage`, which is undefined if a module is imported outside a browser. */
 export const SHADER_STAGE = { vertex: 1, fragment: 2, compute: 4 } as const;
 
 /** `GPUBufferUsage` and `GPUTextureUsage`, likewise. */
@@ -185,7 +188,7 @@ export const TEXTURE_USAGE = {
 
 const cache = new WeakMap<object, Map<string, unknown>>();
 
-/** Something that is made once for a device (a pipeline, say) and shared by all renderers on it. */
+/** An object that is created once for a device (a pipeline, for example) and shared by all its renderers. */
 export function perDevice<T>(device: object, key: string, make: () => T): T {
   let made = cache.get(device);
   if (made === undefined) cache.set(device, (made = new Map()));
@@ -193,7 +196,7 @@ export function perDevice<T>(device: object, key: string, make: () => T): T {
   return made.get(key) as T;
 }
 
-/** The kernel of a compute shader with the given overrides, made once for a device and ready for the next frame. */
+/** Returns the kernel of a compute shader with the given overrides, created once for a device and compiled at once. */
 export function kernelOf<S extends ShaderDescription>(
   device: GPUDevice,
   shader: S,
@@ -202,7 +205,7 @@ export function kernelOf<S extends ShaderDescription>(
   return rareKernelOf(device, shader, overrides).prepare();
 }
 
-/** The same for what few scenes need: {@link ComputeKernel.prepare} it when such a scene comes. */
+/** The same for rarely used shaders: call {@link ComputeKernel.prepare} when a scene needs one. */
 export function rareKernelOf<S extends ShaderDescription>(
   device: GPUDevice,
   shader: S,
@@ -212,7 +215,7 @@ export function rareKernelOf<S extends ShaderDescription>(
   return perDevice(device, key, () => new ComputeKernel(device, shader, overrides));
 }
 
-/** A shader whose storage texture `image` has another format than in its text, which WGSL has no way to leave open. */
+/** Replaces the format of the storage texture `image` of a shader, because WGSL cannot parameterize it. */
 export function storingInto<S extends ShaderDescription & { bindings: { image: ShaderBinding } }>(
   shader: S,
   format: GPUTextureFormat,

@@ -1,9 +1,9 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 
-/** Bytes: a binding must hold one element of its array, even if the scene has none. */
+/** Bytes: a binding must hold at least one element of its array, even for an empty scene. */
 const SMALLEST_BUFFER = 64;
 
-/** GPU objects with one owner: counts their bytes, checks the device's limits, and destroys them together. */
+/** GPU objects with one owner: counts their bytes, checks the limits of the device, and destroys them together. */
 export class GpuMemory {
   readonly #device: GPUDevice;
   readonly #buffers = new Map<GPUBuffer, number>();
@@ -58,8 +58,8 @@ function requireBufferSize(device: GPUDevice, label: string, size: number): void
 }
 
 /**
- * Runs `allocate` and waits until the device has really found the memory.
- * @throws GaussianSplatError `out-of-memory/allocation`; what `allocate` threw, if it threw.
+ * Runs `allocate` and waits until the device has confirmed the allocation.
+ * @throws GaussianSplatError `out-of-memory/allocation`; also rethrows errors of `allocate`.
  */
 export async function withMemoryCheck<T extends { destroy(): void }>(
   device: GPUDevice,

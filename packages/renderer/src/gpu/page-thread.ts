@@ -1,6 +1,6 @@
-/** The page's one thread: a turn on it for others, and when it was last blocked. */
+/** The main thread: yields to other tasks, and records when it was last blocked. */
 
-/** Lets other tasks have the thread. Timers would wait long where the page is hidden. */
+/** Yields to other tasks. A message is used because timers are delayed on hidden pages. */
 export function turn(): Promise<void> {
   const { port1, port2 } = new MessageChannel();
   return new Promise((resolve) => {
@@ -12,22 +12,22 @@ export function turn(): Promise<void> {
   });
 }
 
-/** Milliseconds between two looks whether the page's thread is free, and by which they may be late. */
+/** Interval of the checks whether the main thread is free, in ms, and their tolerated delay. */
 const BEAT_MS = 4;
 const LATE_MS = 2;
 
-/** When the page was told of something. */
+/** Notification on the main thread, ms. */
 export interface Told {
   readonly now: number;
-  /** The earliest moment at which it may have been so: another where the thread was busy until then. */
+  /** Earliest possible time of the event: earlier than `now` if the thread was busy until then. */
   readonly since: number;
 }
 
-/** Knows when the page's thread was last blocked, as long as somebody waits: what is told then is told late. */
+/** Records when the main thread was last blocked while anything is awaited, because notifications are late then. */
 class ThreadWatch {
   #waiting = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
-  /** When the last look was and the next one is due, and when the last block began, at the earliest, and ended. */
+  /** Time of the last check and due time of the next; earliest begin and the end of the last block. */
   #looked = 0;
   #due = 0;
   #block = { from: -Infinity, to: -Infinity };
@@ -65,5 +65,5 @@ class ThreadWatch {
   };
 }
 
-/** One for the page: it has one thread. */
+/** One for the page, because it has one main thread. */
 export const threadWatch = new ThreadWatch();

@@ -1,6 +1,6 @@
 import { BUFFER_USAGE } from './kernel.js';
 
-/** When one pass of one frame ran, in milliseconds on the GPU's own clock. */
+/** Start and end of one pass of one frame, in milliseconds on the GPU's own clock. */
 export interface PassTime {
   /** `project`, `sort`, `bin`, `rasterize` or `compose`. */
   readonly label: string;
@@ -8,15 +8,15 @@ export interface PassTime {
   readonly end: number;
 }
 
-/** Something that notes on the GPU when the passes of frames ran. */
+/** Records on the GPU the start and the end of the passes of frames. */
 export interface FrameTimer {
   /** Starts the next frame. The renderer calls this. */
   startFrame(): void;
-  /** What a pass descriptor needs to be timed; undefined for a pass that is not. */
+  /** Returns the timestamp entry of a pass descriptor; undefined for a pass that is not timed. */
   timestampWrites(label: string): GPUComputePassTimestampWrites | undefined;
   /** Ends the frame, with the last encoder of it. */
   endFrame?(encoder: GPUCommandEncoder): void;
-  /** The frame has been submitted. */
+  /** Called when the frame has been submitted. */
   submitted?(): void;
 }
 
@@ -26,7 +26,7 @@ const QUERY_RESOLVE = 0x200;
 
 /**
  * Timestamps around the passes of many frames, read back together afterwards so that measuring never waits between
- * frames. Browsers round timestamps to 100 µs unless a flag says otherwise.
+ * frames. Browsers round timestamps to 100 µs unless a flag disables it.
  */
 export class PassTimer implements FrameTimer {
   readonly #device: GPUDevice;
@@ -44,7 +44,7 @@ export class PassTimer implements FrameTimer {
     this.#frames.push([]);
   }
 
-  /** Undefined once the room for timestamps is used up. */
+  /** Returns undefined once the query set is full. */
   timestampWrites(label: string): GPUComputePassTimestampWrites | undefined {
     if (this.#used + 2 > MAX_QUERIES) return undefined;
     this.#frames.at(-1)?.push(label);

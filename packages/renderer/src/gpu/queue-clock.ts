@@ -1,38 +1,42 @@
 import { perDevice } from './kernel.js';
 import { threadWatch, type Told } from './page-thread.js';
 
-/** Empty submissions of which the fastest tells how long a GPU with nothing to do takes to say so. */
+/** Number of empty submissions in a calibration; the fastest is the latency of an idle GPU. */
 const TRIES = 4;
-/** What that takes is measured anew after so long, ms. */
+/** Validity of a calibration, ms. */
 const VALID_MS = 60_000;
 
-/** Answers so soon after one another, ms, may have waited for the later one. */
+/** Notifications closer together than this, ms, may have been delayed until the later one. */
 const TOGETHER_MS = 1;
 
-/** How long work kept the GPU, ms: one figure where the page's thread was free when it was done. */
+/** GPU time of some work, ms: a single value if the main thread was free when the work finished. */
 export interface WorkTime {
-  /** When it was done, by the page's clock. */
+  /** End of the work, by the page's clock. */
   readonly doneAt: number;
   readonly atLeast: number;
   readonly atMost: number;
 }
 
 /**
- * Times work as a page waits for it: until the queue says that it is done, less what waiting for nothing takes. The time between a GPU's own timestamps leaves out what the browser
- * does between passes, which can be most of a frame. Nothing waits for it, and nothing is submitted but to calibrate.
+ * Times work as a page experiences it: until the queue reports completion, minus the latency of an empty submission.
+ * GPU timestamps exclude the browser's work between passes, which can be most of a frame. Never blocks, and submits
+ * only for calibration.
  */
 export class QueueClock {
-  /** Others, who do not wait by this clock, work on the queue, too: when their work is done is asked before each frame. */
+  /**
+   * Whether other code that does not use this clock submits to the queue: then its completion is queried before each
+   * frame.
+   */
   isShared = false;
   readonly #device: GPUDevice;
   #latency = Infinity;
   #measuredAt = -Infinity;
-  /** When what was submitted was last known to be done. */
+  /** Last known completion time of submitted work. */
   #last: Told = { now: -Infinity, since: -Infinity };
-  /** Work that was told of at about one moment: since when, how much of it, and what all of it took, ms. */
+  /** Work reported at about the same moment: start, number of items, and their total time, ms. */
   #together = { now: -Infinity, count: 0, milliseconds: 0 };
 
-  /** The one of a device. */
+  /** Returns the clock of a device. */
   static of(device: GPUDevice): QueueClock {
     return perDevice(device, 'queue clock', () => new QueueClock(device));
   }
@@ -41,12 +45,15 @@ export class QueueClock {
     this.#device = device;
   }
 
-  /** Milliseconds that waiting for nothing takes; 0 until that is known. */
+  /** Latency of an empty submission in ms; 0 until it is measured. */
   get latency(): number {
     return this.#latency < Infinity ? this.#latency : 0;
   }
 
-  /** Measures what waiting for nothing takes, by a few empty submissions, unless that was done of late. Call it where the GPU has nothing to do. */
+  /**
+   * Measures the latency with a few empty submissions, unless a recent measurement exists. Call it while the GPU is
+   * idle.
+   */
   async calibrate(): Promise<void> {
     if (performance.now() - this.#measuredAt < VALID_MS) return;
     this.#measuredAt = performance.now();
@@ -59,7 +66,7 @@ export class QueueClock {
     this.#latency = Math.min(...times);
   }
 
-  /** Waits until all that was submitted is done. @returns when the page was notified, and when of what was done before */
+  /** Waits for all submitted work. @returns The time of the notification, and the previous completion time. */
   async done(): Promise<Told & { readonly before: Told }> {
     const told = await threadWatch.during(this.#device.queue.onSubmittedWorkDone());
     const before = this.#last;
@@ -67,17 +74,17 @@ export class QueueClock {
     return { ...told, before };
   }
 
-  /** Times what `submit` submits. Rejects where the device is lost. */
+  /** Times the work that `submit` submits. Rejects if the device is lost. */
   async time(submit: () => void): Promise<WorkTime> {
     if (this.isShared) this.done().catch(() => undefined);
     submit();
     const submitted = performance.now();
     const { now, since, before } = await this.done();
-    // No work takes less than none.
+    // The latency is the shortest time ever measured.
     this.#latency = Math.min(this.#latency, now - submitted);
     const atMost = this.spent(before.since, submitted, now);
     const atLeast = Math.min(atMost, this.spent(before.now, submitted, since));
-    // Of work that is told of together the first seems to take the time of all.
+    // If several results are reported together, the first seems to take the time of all.
     const isTogether = before.now > submitted && now - this.#together.now < TOGETHER_MS;
     const together = isTogether ? this.#together : (this.#together = { now, count: 0, milliseconds: 0 });
     together.count++;
@@ -89,9 +96,10 @@ export class QueueClock {
   }
 
   /**
-   * Milliseconds that work kept the GPU: from when it could begin, which is when it was submitted and what came before was done.
-   * @param before when that was known to be done
-   * @param done when the work itself was
+   * Milliseconds of GPU time: from its earliest start, which is after its submission and after the completion of
+   * earlier work.
+   * @param before Completion time of the earlier work.
+   * @param done Completion time of this work.
    */
   spent(before: number, submitted: number, done: number): number {
     return Math.max(0, Math.min(done - before, done - submitted - this.latency));

@@ -1,16 +1,16 @@
 import { BUFFER_USAGE } from './kernel.js';
 
-/** A part of a buffer to read. */
+/** A range of a buffer to read. */
 export interface ReadPart {
   readonly buffer: GPUBuffer;
-  /** Bytes from the beginning of the buffer, default 0, and how many, default all. */
+  /** Offset from the start of the buffer, default 0, and length, default all, in bytes. */
   readonly byteOffset?: number;
   readonly byteLength?: number;
 }
 
 /**
  * Reads buffers back, in one submission. Rejects if the device is lost meanwhile.
- * @param encoder has recorded what writes the buffers; default: a new one
+ * @param encoder Contains the commands that write the buffers; default: a new one.
  */
 export async function readBack(
   device: GPUDevice,
@@ -21,8 +21,8 @@ export async function readBack(
 }
 
 /**
- * The same, for those who put the bytes elsewhere.
- * @param take is given the bytes of each part, which are gone when it has returned
+ * The same, for callers that copy the bytes elsewhere.
+ * @param take Is called with the bytes of each range, which are valid until it returns.
  */
 export async function readBackWith<Taken>(
   device: GPUDevice,

@@ -1,13 +1,13 @@
 import { BUFFER_USAGE } from './kernel.js';
 import type { FrameTimer } from './pass-timer.js';
 
-/** Frames that may be on their way back at once; while all are, further frames are not timed. */
+/** Maximum number of frames in transit to the CPU; while it is reached, further frames are not timed. */
 const SLOTS = 4;
 const MAX_PASSES = 16;
 const QUERIES = 2 * MAX_PASSES;
 const QUERY_RESOLVE = 0x200;
 
-/** The queries of one frame and where they are read. */
+/** The queries of one frame and their read-back buffer. */
 interface Slot {
   readonly first: number;
   readonly resolved: GPUBuffer;
@@ -16,8 +16,9 @@ interface Slot {
 }
 
 /**
- * How long frames keep the GPU: from the begin of the first pass to the end of the last, milliseconds. Made for every frame of a page: all memory is
- * allocated at once, nothing waits, and results come when they come. What the GPU does between frames for others does not count.
+ * Measures the GPU time of frames in milliseconds: from the beginning of the first pass to the end of the last.
+ * Designed for every frame of a page: all memory is allocated at once, nothing waits, and results arrive
+ * asynchronously. GPU work of other pages between frames does not count.
  */
 export class SpanTimer implements FrameTimer {
   readonly #queries: GPUQuerySet;
@@ -25,7 +26,7 @@ export class SpanTimer implements FrameTimer {
   #slot: Slot | undefined;
   #onSpan: ((milliseconds: number | null) => void) | undefined;
   #passes = 0;
-  /** Of the last frame that is known. */
+  /** Start of the last measured frame. */
   #begin = 0n;
   #isDestroyed = false;
 
@@ -45,8 +46,8 @@ export class SpanTimer implements FrameTimer {
 
   /**
    * Times the next frame.
-   * @param onSpan gets its milliseconds, or null where the GPU gave none that can be believed.
-   * @returns false if it cannot be timed: too many are on their way
+   * @param onSpan Is called with its milliseconds, or with null if the GPU reported no plausible time.
+   * @returns False if it cannot be timed because too many frames are in transit.
    */
   expect(onSpan: (milliseconds: number | null) => void): boolean {
     this.#onSpan = onSpan;
@@ -61,7 +62,7 @@ export class SpanTimer implements FrameTimer {
   timestampWrites(): GPUComputePassTimestampWrites | undefined {
     const slot = this.#slot;
     if (slot === undefined) return undefined;
-    // A frame that is divided into many submissions may have more: the last of them leaves the last pair.
+    // A frame that is divided into many submissions may have more passes: the last one overwrites the last pair.
     if (this.#passes < MAX_PASSES) this.#passes++;
     const at = slot.first + 2 * (this.#passes - 1);
     return { querySet: this.#queries, beginningOfPassWriteIndex: at, endOfPassWriteIndex: at + 1 };
@@ -90,7 +91,7 @@ export class SpanTimer implements FrameTimer {
         this.#begin = begin;
         onSpan(milliseconds);
       },
-      // A lost device: nobody waits any more.
+      // Ignored, because the device is lost.
       () => undefined,
     );
   }
@@ -105,14 +106,15 @@ export class SpanTimer implements FrameTimer {
   }
 }
 
-/** No frame takes longer and is still alive, ms. */
+/** Plausible maximum of a frame, ms. */
 const MOST_MS = 60_000;
 
 /**
- * When a frame began, and how long it took. A frame may be shorter than a step of the clock, which browsers make 100 µs, and so take nothing.
- * @param stamps nanoseconds, by pairs
- * @param before when the frame before began, ns
- * @returns null milliseconds for clocks that have stood still since then, or run backwards
+ * Returns the begin and the duration of a frame. A frame may be shorter than the resolution of the clock, 100 µs in
+ * browsers, and then takes 0.
+ * @param stamps Nanoseconds, in pairs.
+ * @param before Begin of the previous frame, ns.
+ * @returns Null milliseconds for clocks that have stopped since then, or run backwards.
  */
 export function spanOf(stamps: BigUint64Array, before: bigint): [begin: bigint, milliseconds: number | null] {
   let [begin, end] = [stamps[0], stamps[1]];

@@ -1,10 +1,13 @@
 import { BUFFER_USAGE } from './kernel.js';
 import type { GpuMemory } from './memory.js';
 
-/** Bytes of a block. Of one that is not full all of it is transferred; larger ones were hardly faster to fill (docs/lod-format.md). */
+/**
+ * Bytes of a staging block. A partly filled block is transferred completely; larger ones were hardly faster to fill
+ * (docs/lod-format.md).
+ */
 export const BLOCK_BYTES = 1 << 18;
 
-/** Mapped memory, and how much of it has been written. */
+/** Mapped memory, and the number of its bytes in use. */
 interface Block {
   readonly buffer: GPUBuffer;
   words: Uint32Array<ArrayBuffer>;
@@ -13,16 +16,17 @@ interface Block {
 }
 
 /**
- * Writes to GPU buffers through blocks that the page's thread has mapped, a fixed number of them, allocated once: a copy into mapped memory takes the thread a third of what
- * `queue.writeBuffer` takes. What is written is on its way with {@link StagingBelt.record}, and a block comes back when the GPU is done with it.
+ * Writes to GPU buffers through a fixed number of blocks that are mapped on the main thread and allocated once: a copy
+ * into mapped memory takes a third of the time of `queue.writeBuffer`. {@link StagingBelt.record} records the copies to
+ * the GPU; a block is reused when the GPU has finished with it.
  */
 export class StagingBelt {
   readonly #free: Block[] = [];
   readonly #filled: Block[] = [];
-  /** Those whose copies are recorded. */
+  /** Blocks whose copies are recorded. */
   #leaving: Block[] = [];
 
-  /** @param blocks of {@link BLOCK_BYTES} each; they can be written to when the device has mapped them, a little later */
+  /** @param blocks Number of blocks of {@link BLOCK_BYTES} each; they become writable once the device has mapped them. */
   constructor(memory: GpuMemory, label: string, blocks: number) {
     for (let k = 0; k < blocks; k++) {
       const buffer = memory.buffer(label, BLOCK_BYTES, BUFFER_USAGE.mapWrite | BUFFER_USAGE.copySource);
@@ -30,15 +34,15 @@ export class StagingBelt {
     }
   }
 
-  /** Nothing has been written since the last {@link record}. */
+  /** Whether nothing has been written since the last {@link record}. */
   get isEmpty(): boolean {
     return this.#filled.length === 0;
   }
 
   /**
-   * Copies words, to be written to a buffer by what {@link record} records.
-   * @param at byte of the buffer that the first word goes to, a multiple of 4
-   * @returns how many of the words, from the first on, had room in the blocks that are there
+   * Copies words into staging blocks; {@link record} records their copy to the buffer.
+   * @param at Byte offset of the first word in the buffer, a multiple of 4.
+   * @returns Number of words, from the first on, that fit the available blocks.
    */
   write(to: GPUBuffer, at: number, words: Uint32Array): number {
     let taken = 0;
@@ -55,7 +59,10 @@ export class StagingBelt {
     return taken;
   }
 
-  /** Records the copies of all that was written since. The commands must be submitted, and {@link recall} called, before anything else is written. */
+  /**
+   * Records the copies of everything written since the last call. The commands must be submitted, and {@link recall}
+   * called, before anything else is written.
+   */
   record(encoder: GPUCommandEncoder): void {
     for (const { buffer, copies } of this.#filled) {
       buffer.unmap();
@@ -65,7 +72,7 @@ export class StagingBelt {
     this.#leaving = this.#filled.splice(0);
   }
 
-  /** Asks for the blocks back whose copies have been submitted. */
+  /** Maps the blocks again whose copies have been submitted. */
   recall(): void {
     this.#leaving.splice(0).forEach((block) => this.#map(block));
   }
@@ -92,5 +99,5 @@ export class StagingBelt {
   }
 }
 
-/** `GPUMapMode.WRITE`, a number, as no global of a browser is touched where there may be none. */
+/** `GPUMapMode.WRITE` as a number, because modules access no browser global on import. */
 const MAP_WRITE = 2;

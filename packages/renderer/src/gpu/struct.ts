@@ -1,4 +1,4 @@
-/** Byte layout of a WGSL struct, as scripts/build-shaders.mjs reflects it. */
+/** Byte layout of a WGSL struct, reflected by scripts/build-shaders.mjs. */
 export interface StructLayout {
   readonly size: number;
   readonly fields: Readonly<Record<string, { readonly offset: number; readonly type: string }>>;
@@ -6,7 +6,10 @@ export interface StructLayout {
 
 export type StructValues<L extends StructLayout> = Readonly<Record<keyof L['fields'], number | ArrayLike<number>>>;
 
-/** Writes a struct into `target` at a byte offset: whole numbers for `u32`, `i32` and their vectors, float32 for everything else. */
+/**
+ * Writes a struct into `target` at a byte offset: integers for `u32`, `i32` and their vectors, float32 for all other
+ * fields.
+ */
 export function writeStruct<L extends StructLayout>(
   layout: L,
   values: StructValues<L>,

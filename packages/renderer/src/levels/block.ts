@@ -2,11 +2,11 @@ import { constants } from '../generated/shaders.js';
 import { FACTOR_NUMBERS, shNumbers, type LevelSource, type SplatLevel } from './splat-level.js';
 import { areaOf, BLUE, covarianceOf, factorOf, GREEN, MASS, OPACITY, RED, ROW, SPREAD, X, Y, Z } from './splat-rows.js';
 
-/** Splats that are merged among one another: those of the chunks that get one parent. */
+/** Splats that are merged with one another: those of the chunks with the same parent. */
 export const BLOCK = 4 * constants.CULL_GROUP;
 
 const SH_C0 = 0.28209479177387814;
-/** Keeps shares of splats that cover nothing finite. */
+/** Keeps ratios finite for splats that cover nothing. */
 const TINY = 1e-30;
 
 /** The splats of a block while they are merged. */
@@ -16,15 +16,15 @@ export class Block {
   dilation = 0;
   /** [count] see splat-rows.ts. */
   readonly rows = new Float64Array(ROW * BLOCK);
-  /** Harmonics of the splats that were loaded. */
+  /** Harmonics of the loaded splats. */
   readonly #sh = new Float32Array(shNumbers(3) * BLOCK);
-  /** Of each splat that was loaded: its mass, and the splat that it is now part of. */
+  /** For each loaded splat: its mass, and the index of the merged splat that contains it. */
   readonly #loadedMass = new Float64Array(BLOCK);
   readonly #cluster = new Int32Array(BLOCK);
   readonly #place = new Int32Array(BLOCK);
   #loaded = 0;
 
-  /** Takes over `count` splats of a level from `first` on, at most {@link BLOCK}. */
+  /** Loads `count` splats of a level from `first` on, at most {@link BLOCK}. */
   load(level: LevelSource, first: number, count: number): void {
     const { positions, factors, opacities, spreads, shDegree } = level;
     const { rows } = this;
@@ -51,7 +51,7 @@ export class Block {
     this.count = count;
   }
 
-  /** Drops the splats that have become part of another: `partOf[k]` is that other, or -1. The rest keep their order. */
+  /** Removes splats that were merged into another: `partOf[k]` is its index, or -1. The rest keep their order. */
   closeRanks(partOf: Int32Array): void {
     const { rows } = this;
     let kept = 0;

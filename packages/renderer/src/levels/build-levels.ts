@@ -3,26 +3,26 @@ import { Block, BLOCK } from './block.js';
 import { BlockReducer } from './reduce-block.js';
 import { chunksOf, emptyLevel, leafLevel, type LevelSource, type SplatLevel } from './splat-level.js';
 
-/** Splats of the next level for one of this. */
+/** Ratio of the splats of the next level to those of this one. */
 const KEPT = 1 / 4;
-/** Blocks between two steps: some ten milliseconds. */
+/** Blocks in each step: about ten milliseconds. */
 const BLOCKS_A_STEP = 8;
 
 /**
- * All levels of detail of the splats `kept` of a cloud, finest first: each merges the splats of four chunks of the one before to those of one,
- * until one chunk holds the scene. All levels together have 4/3 of the splats.
+ * Builds all levels of detail of the splats `kept` of a cloud, finest first: each level merges the splats of four
+ * chunks into those of one, until one chunk represents the scene. All levels together have 4/3 of the splats.
  */
 export function buildLevels(cloud: GaussianCloud, kept: Uint32Array): SplatLevel[] {
   const leaves = leafLevel(cloud, kept);
   return [leaves, ...levelsAbove(leaves)];
 }
 
-/** All levels coarser than one. */
+/** Builds all levels coarser than the given one. */
 export function levelsAbove(finest: LevelSource): SplatLevel[] {
   return finish(buildLevelsAbove(finest));
 }
 
-/** The same in steps of some ten milliseconds, for those who have something else to do meanwhile. */
+/** The same in steps of about ten milliseconds, for callers whose thread has other tasks. */
 export function* buildLevelsAbove(finest: LevelSource): Generator<void, SplatLevel[]> {
   const levels: SplatLevel[] = [];
   let level = finest;
@@ -34,7 +34,7 @@ export function* buildLevelsAbove(finest: LevelSource): Generator<void, SplatLev
   return levels;
 }
 
-/** The next coarser level: chunk k of it stands for chunks 4 k to 4 k + 3. */
+/** Builds the next coarser level: its chunk k represents chunks 4 k to 4 k + 3. */
 function* buildNextLevel(level: LevelSource): Generator<void, SplatLevel> {
   const reducer = new BlockReducer();
   const block = new Block();
@@ -49,7 +49,7 @@ function* buildNextLevel(level: LevelSource): Generator<void, SplatLevel> {
   return next;
 }
 
-/** Takes all steps at once. */
+/** Runs all steps at once. */
 export function finish<T>(steps: Generator<void, T>): T {
   for (;;) {
     const { done, value } = steps.next();

@@ -2,14 +2,14 @@ import { constants, layouts } from '../generated/shaders.js';
 import { chunksOf, FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
 import { CHUNK_NUMBERS } from '../pack/words.js';
 
-/** Numbers of one `ChunkDetail` of shaders/shared/detail.wgsl. */
+/** Numbers in one `ChunkLod` of shaders/shared/lod.wgsl. */
 export const DETAIL_NUMBERS = layouts.ChunkDetail.size / 4;
 
 const { CULL_GROUP, ALPHA_MIN, NO_CHILDREN } = constants;
 const fields = layouts.ChunkDetail.fields;
 const place = (name: keyof typeof fields): number => fields[name].offset / 4;
 
-/** Where the numbers of a row lie. */
+/** Offsets of the fields of a row. */
 export const DETAIL_PLACES = {
   sphere: place('sphere'),
   parentSphere: place('parent_sphere'),
@@ -19,22 +19,22 @@ export const DETAIL_PLACES = {
   children: place('children'),
 } as const;
 
-/** The parent's error of a chunk without parent: never small enough. */
+/** Parent error of a chunk without a parent: larger than any threshold. */
 export const ENDLESS = 1e25;
 
-/** Factor by which a parent's error and sphere exceed those of its children: more than float32 rounds. */
+/** Factor of the error and the sphere of a parent over those of its children: more than the rounding error of float32. */
 const STRICTLY = 1.00001;
 
 /** Sphere and error of each chunk of a level. */
 export interface ChunkErrors {
   readonly count: number;
-  /** [C, 4] centre and radius: holds the centres of the splats and the spheres of the chunks that it stands for. */
+  /** [C, 4] center and radius: encloses the centers of the splats and the spheres of the child chunks. */
   readonly spheres: Float32Array;
-  /** [C] world units: 0 for the finest level, larger than those of the chunks that it stands for. */
+  /** [C] world units: 0 for the finest level, larger than those of the child chunks. */
   readonly errors: Float32Array;
 }
 
-/** `Chunk` rows of merged splats: boxes of their centres, and how far they reach. */
+/** `Chunk` rows of merged splats: boxes of their centers, and their reach. */
 export function boundLevel({ count, positions, factors, opacities }: SplatLevel): Float32Array {
   const chunks = new Float32Array(CHUNK_NUMBERS * chunksOf(count));
   for (let first = 0, at = 0; first < count; first += CULL_GROUP, at += CHUNK_NUMBERS) {
@@ -54,14 +54,14 @@ export function boundLevel({ count, positions, factors, opacities }: SplatLevel)
   return chunks;
 }
 
-/** Sum of a splat's variances along three axes: at least that along the longest. */
+/** Trace of a splat's covariance: at least the variance along the longest axis. */
 function traceOf(factors: Float32Array, i: number): number {
   let sum = 0;
   for (let k = 0; k < FACTOR_NUMBERS; k++) sum += factors[FACTOR_NUMBERS * i + k] ** 2;
   return sum;
 }
 
-/** Errors of the finest level: none. Its spheres hold the boxes. */
+/** Errors of the finest level, which are 0. Its spheres enclose the boxes. */
 export function leafErrors(chunks: Float32Array): ChunkErrors {
   const count = chunks.length / CHUNK_NUMBERS;
   const spheres = new Float32Array(4 * count);
@@ -70,8 +70,8 @@ export function leafErrors(chunks: Float32Array): ChunkErrors {
 }
 
 /**
- * Errors of a coarser level, of which chunk c stands for chunks 4 c to 4 c + 3 of `finer`.
- * @param rounding of centres, twice the most, as a part of the diagonal of a chunk's box
+ * Errors of a coarser level, whose chunk c represents chunks 4 c to 4 c + 3 of `finer`.
+ * @param rounding Twice the maximum rounding error of centers, as a fraction of the diagonal of a chunk's box.
  */
 export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: ChunkErrors, rounding = 0): ChunkErrors {
   const count = chunks.length / CHUNK_NUMBERS;
@@ -85,7 +85,7 @@ export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: Chu
       radius = Math.max(radius, Math.hypot(x - cx, y - cy, z - cz) + r);
       error = Math.max(error, finer.errors[child]);
     }
-    // Centres far from the origin are rounded themselves.
+    // Centers far from the origin are rounded themselves.
     const rounded = 1e-6 * Math.hypot(x, y, z);
     spheres.set([x, y, z, radius * STRICTLY + rounded], 4 * c);
     errors[c] = Math.max(error * STRICTLY, LEAST_ERROR);
@@ -93,10 +93,10 @@ export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: Chu
   return { count, spheres, errors };
 }
 
-/** A merge that displaces nothing is an error all the same: with no error at all allowed, leaves are drawn. */
+/** Minimum error of a merge, even without displacement, so that a threshold of 0 draws the leaves. */
 const LEAST_ERROR = 1e-20;
 
-/** Twice the root mean square of how far the splats of a chunk are displaced, those alone that stand for several: nearly all are off by less. */
+/** Twice the root mean square displacement of the splats that were merged in a chunk; nearly all are displaced less. */
 function ownError({ count, spreads }: SplatLevel, chunk: number): number {
   const [first, end] = [CULL_GROUP * chunk, Math.min(count, CULL_GROUP * (chunk + 1))];
   let [sum, merged] = [0, 0];
@@ -114,7 +114,7 @@ function sphereOfBox(chunks: Float32Array, c: number): [number, number, number, 
   return [x, y, z, radius * STRICTLY];
 }
 
-/** The rows of one level; `parents` are those of the next coarser, none for the coarsest. */
+/** Rows of one level; `parents` are those of the next coarser level, none for the coarsest. */
 export function detailRows(own: ChunkErrors, parents: ChunkErrors | undefined): Float32Array {
   const rows = new Float32Array(DETAIL_NUMBERS * own.count);
   const words = new Uint32Array(rows.buffer);

@@ -10,16 +10,16 @@ import type { PackedLevels } from './packed-levels.js';
 import type { ShPrecision } from '../pack/words.js';
 
 /**
- * A scene on the GPU to which levels of detail have been added: its own splats, where they are, and the coarser ones beside them. With the setting `detail` at 0 the
- * image is that of the scene, byte for byte.
+ * A scene on the GPU with added levels of detail: its own splats in place, and the coarser ones in extra blocks. If the
+ * setting `lodError` is 0, the image equals that of the scene byte for byte.
  */
 export class DetailedGaussians implements GaussianScene {
-  /** Splats of all levels together. */
+  /** Splats over all levels. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
@@ -48,9 +48,10 @@ export class DetailedGaussians implements GaussianScene {
   }
 
   /**
-   * Adds levels to a scene that is on the GPU; it stays the caller's, and must live as long as this.
-   * @param levels of exactly this scene, from `buildPackedLevels`
-   * @throws GaussianSplatError `out-of-memory/budget` if the levels alone take more than `memoryBudget`, `out-of-memory/allocation` if there is no room.
+   * Adds levels to a scene on the GPU; the caller keeps the scene, which must outlive this object.
+   * @param levels Built from exactly this scene by `buildPackedLevels`.
+   * @throws GaussianSplatError `out-of-memory/budget` if the levels alone exceed `memoryBudget`,
+   * `out-of-memory/allocation` if the device has too little memory.
    */
   static async upload(
     device: GPUDevice,
@@ -76,19 +77,19 @@ export class DetailedGaussians implements GaussianScene {
     return this.#leaves.version;
   }
 
-  /** Bytes of GPU memory that the levels take, the scene itself not counted. */
+  /** Bytes of GPU memory of the levels, without the scene itself. */
   get byteLength(): number {
     return this.#memory.byteLength + this.#coarser.byteLength;
   }
 
-  /** Frees the levels, and leaves the scene alone. */
+  /** Frees the levels, but not the scene. */
   destroy(): void {
     this.#memory.destroy();
     this.#coarser.destroy();
   }
 }
 
-/** The same pages, each with the rows of its chunks. */
+/** The same blocks, each with the rows of its chunks. */
 function withDetails(pages: readonly GaussianPage[], details: Float32Array, memory: GpuMemory): GaussianPage[] {
   const words = new Uint32Array(details.buffer, details.byteOffset, details.length);
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;

@@ -20,23 +20,24 @@ import {
 } from './splat-rows.js';
 
 /**
- * What a splat covers, as a share of its own area 2π √|Σ|: its opacity, as long as that is at most 1. A merged splat may have to cover more
- * than its area: an opacity above 1, cut off where it would be opaque, gives it a flat top (∫ min(1, o e^(−r²/2)) = 2π (1 + ln o)).
+ * Coverage of a splat, relative to its own area 2π √|Σ|: its opacity, if that is at most 1. A merged splat may have to
+ * cover more than its area: an opacity above 1, clamped when drawn, gives it a flat top (∫ min(1, o e^(−r²/2)) = 2π (1
+ * + ln o)).
  */
 export const coverOfOpacity = (opacity: number): number => (opacity <= 1 ? opacity : 1 + Math.log(opacity));
 
-/** Most that a splat may cover: opacities end at e. */
+/** Maximum coverage of a splat: opacities end at e. */
 const MOST_COVER = 2;
 
-/** The opacity of a splat that covers so much of its area. */
+/** Opacity of a splat with this coverage of its area. */
 export function opacityOfCover(cover: number): number {
   return cover <= 1 ? cover : Math.exp(Math.min(MOST_COVER, cover) - 1);
 }
 
-/** How much more it counts to displace a splat whose colour differs by 1 in a channel. */
+/** Weight of the displacement of a splat if the colors differ by 1 in a channel. */
 const COLOR_WEIGHT = 2;
 
-/** Square of how far merging the splats at p and q displaces them, in world units²: apart, in shape, and more if their colours differ. */
+/** Squared displacement from merging the splats at p and q, in world units²: by distance, shape and color difference. */
 function displacement(rows: Float64Array, p: number, q: number): number {
   const dx = rows[p + X] - rows[q + X];
   const dy = rows[p + Y] - rows[q + Y];
@@ -57,7 +58,10 @@ function displacement(rows: Float64Array, p: number, q: number): number {
   return (dx * dx + dy * dy + dz * dz) * color + shape;
 }
 
-/** Ward's criterion (1963): what a merge of the splats at p and q adds to the squared displacement of all that is covered. */
+/**
+ * Ward's criterion (1963): increase of the total squared displacement, weighted by mass, from merging the splats at p
+ * and q.
+ */
 export function mergeCost(rows: Float64Array, p: number, q: number): number {
   const first = rows[p + MASS];
   const second = rows[q + MASS];
@@ -65,8 +69,9 @@ export function mergeCost(rows: Float64Array, p: number, q: number): number {
 }
 
 /**
- * Makes the splat at i stand for both: the first two moments of the two, and their cover as the three axes see it. Seen from so far away that
- * their displacement is a pixel, which is where they are first drawn as one: small splats are wider there, by the dilation.
+ * Merges two splats into the one at i: it keeps their first two moments and their coverage along the three axes. The
+ * coverage is computed for the distance that makes their displacement a pixel, because they are first drawn merged
+ * there; small splats are wider at that distance, by the dilation.
  */
 export function mergePair(rows: Float64Array, i: number, j: number, dilation: number): void {
   const mass = rows[i + MASS] + rows[j + MASS];
@@ -88,8 +93,8 @@ export function mergePair(rows: Float64Array, i: number, j: number, dilation: nu
 }
 
 /**
- * Area that two splats cover together, in units of 2π, summed over the views along the three axes, all variances larger by `low`: what each covers, less what both do,
- * ∫ G₁ G₂ = 2π √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
+ * Joint area of two splats in units of 2π, summed over views along the three axes, with all variances increased by
+ * `low`: the sum of both areas minus their overlap, ∫ G₁ G₂ = 2π √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
  */
 function jointCover(rows: Float64Array, i: number, j: number, low: number): number {
   const dx = rows[j + X] - rows[i + X];

@@ -4,7 +4,7 @@ import { packSh } from '../pack/sh.js';
 import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
 import { GEOMETRY_WORDS, type ShPrecision } from '../pack/words.js';
 
-/** Geometry words of splats `from` to `end` of a level, all of them by default, from splat `first` of `words` on. */
+/** Writes the geometry words of splats `from` to `end` of a level, by default all, to `words` from splat `first` on. */
 export function packLevelGeometry(
   level: SplatLevel,
   words: Uint32Array,
@@ -28,7 +28,7 @@ export function packFiller(words: Uint32Array, first: number, end: number): void
   for (let i = first; i < end; i++) packShape(words, GEOMETRY_WORDS * i + 3, factor, 0);
 }
 
-/** Spherical harmonics of splats `from` to `end` of a level, all of them by default. */
+/** Packs the spherical harmonics of splats `from` to `end` of a level, by default all. */
 export function packLevelSh(level: SplatLevel, precision: ShPrecision, from = 0, end = level.count): Uint32Array {
   const { sh, shDegree } = level;
   const order = level.shOrder?.subarray(from, end) ?? Uint32Array.from({ length: end - from }, (_, k) => from + k);

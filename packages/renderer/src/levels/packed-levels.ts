@@ -8,7 +8,7 @@ import { chunksOf, type SplatLevel, FACTOR_NUMBERS, type LevelSource } from './s
 import { shReader, unpackSplat } from '../pack/unpack.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from '../pack/words.js';
 
-/** The splats of a packed scene as the finest level: what made it, file or generator, need not be there any more. */
+/** The splats of a packed scene as the finest level; its source, file or generator, is not needed. */
 export function packedLeaves(packed: PackedGaussians): LevelSource {
   const { count, geometry, shDegree, antialiased, filterVariance = constants.DILATION } = packed;
   const positions = new Float32Array(3 * count);
@@ -22,17 +22,21 @@ export function packedLeaves(packed: PackedGaussians): LevelSource {
 
 const { CULL_GROUP } = constants;
 
-/** The coarser levels of a packed scene, apart from it. Plain data with transferable buffers, so that a worker can make it. */
+/**
+ * The coarser levels of a packed scene, separate from it. Plain data with transferable buffers, so that a worker can
+ * build it.
+ */
 export interface PackedLevels {
-  /** [ceil(N / 256), 12] numbers: `ChunkDetail` of each chunk of the scene itself. */
+  /** [ceil(N / 256), 12] numbers: `ChunkLod` of each chunk of the scene itself. */
   readonly leafDetails: Float32Array;
-  /** All coarser levels, one after the other, each from a chunk's start on, with `details`. */
+  /** All coarser levels in sequence, each aligned to a chunk, with `details`. */
   readonly coarser: PackedGaussians;
 }
 
 /**
- * Builds the levels of detail of a packed scene: a third as many splats as it has, that stand for four, sixteen and more of them. In steps of some ten
- * milliseconds: take them with `next()` until `done`; undefined for a scene that is too small to have any.
+ * Builds the levels of detail of a packed scene: a third as many splats, which replace groups of four, sixteen and
+ * more. Runs in steps of about ten milliseconds: call `next()` until `done`. Undefined for a scene that is too small
+ * for levels.
  */
 export function* buildPackedLevels(leaves: PackedGaussians): Generator<void, PackedLevels | undefined> {
   if (chunksOf(leaves.count) <= 1) return undefined;
@@ -51,7 +55,7 @@ export function* buildPackedLevels(leaves: PackedGaussians): Generator<void, Pac
   return { leafDetails: details[0], coarser };
 }
 
-/** Splats that are packed in one step. */
+/** Splats packed in one step. */
 const PACKED_A_STEP = 64 * CULL_GROUP;
 
 function* packLevels(levels: readonly SplatLevel[], { geometry, sh, shPrecision }: PackedGaussians): Generator<void> {
@@ -70,14 +74,14 @@ function* packLevels(levels: readonly SplatLevel[], { geometry, sh, shPrecision 
   }
 }
 
-/** Rows of each level, the leaves first. */
+/** Rows of each level, leaves first. */
 function detailsOf(levels: readonly SplatLevel[], chunks: readonly Float32Array[]): Float32Array[] {
   const errors: ChunkErrors[] = [leafErrors(chunks[0])];
   levels.forEach((level, k) => errors.push(parentErrors(level, chunks[k + 1], errors[k])));
   return errors.map((own, k) => detailRows(own, errors[k + 1]));
 }
 
-/** A scene and its levels in one. */
+/** Joins a scene and its levels. */
 export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: PackedLevels): PackedGaussians {
   const start = CULL_GROUP * (leafDetails.length / DETAIL_NUMBERS);
   const count = start + coarser.count;
@@ -97,8 +101,9 @@ export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: Pa
 }
 
 /**
- * Packs a cloud with all its levels of detail: the splats of {@link packGaussians}, in the same places, and behind them a third as many that stand
- * for four, sixteen and more of them. The settings `detail` and `splatBudget` choose among them; with neither the image is the same.
+ * Packs a cloud with all its levels of detail: the splats of {@link packGaussians}, in the same order, followed by a
+ * third as many that replace groups of four, sixteen and more. The settings `lodError` and `splatBudget` select among
+ * them; with neither the image is the same.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packWithDetail(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {

@@ -2,24 +2,24 @@ import { BLOCK, type Block } from './block.js';
 import { mergeCost, mergePair } from './merge-pair.js';
 import { ROW } from './splat-rows.js';
 
-/** How many of the splats that follow in the order may become a splat's partner. */
+/** Number of following splats in the order that are candidates for a merge. */
 const WINDOW = 6;
-/** In place of a cost, which is 0 or more. */
+/** Marks an unknown cost; costs are not negative. */
 const UNKNOWN = -1;
 
-/** Merges pairs of near neighbours until a number of splats is left. */
+/** Merges pairs of near neighbors until the target number of splats is reached. */
 export class BlockReducer {
   readonly #best = new Int32Array(BLOCK);
   readonly #bestCost = new Float64Array(BLOCK);
   readonly #partOf = new Int32Array(BLOCK);
   /** Costs of the pairs of one round. */
   readonly #pairCosts = new Float64Array(BLOCK);
-  /** For each splat the costs of merging it with those that follow, as far as they are known: most pairs outlive a round. */
+  /** For each splat the known costs of merging it with those that follow: most pairs survive a round. */
   readonly #costs = new Float64Array(WINDOW * BLOCK);
-  /** Of each splat that is left after a round, its number before. */
+  /** Maps each splat after a round to its index before. */
   readonly #before = new Int32Array(BLOCK);
 
-  /** In each round those pairs are merged that are each other's best partner; in the last, the cheapest of them. */
+  /** Each round merges the pairs of mutual best partners; the last round only the cheapest of them. */
   reduce(block: Block, target: number): void {
     this.#costs.fill(UNKNOWN, 0, WINDOW * block.count);
     while (block.count > target) {
@@ -52,7 +52,7 @@ export class BlockReducer {
     }
   }
 
-  /** Merges at most so many pairs; always at least one, for the cheapest pair of all wants each other. */
+  /** Merges at most this many pairs; always at least one, because the cheapest pair is mutual. */
   #mergePairs(block: Block, most: number): void {
     const best = this.#best;
     const partOf = this.#partOf;
@@ -68,7 +68,7 @@ export class BlockReducer {
     }
   }
 
-  /** Costs of the pairs of the next round that are pairs of this one, neither splat having been merged. */
+  /** Keeps the costs of pairs with two unmerged splats for the next round. */
   #keepCosts(count: number): void {
     const partOf = this.#partOf;
     const before = this.#before;
@@ -80,19 +80,19 @@ export class BlockReducer {
       for (let step = 1; step <= WINDOW && i + step < left; step++) {
         const other = before[i + step];
         const isKept = other - old <= WINDOW && !this.#isMerged(old) && !this.#isMerged(other);
-        // What is read never lies before what is written.
+        // The read index is never below the write index.
         costs[WINDOW * i + step - 1] = isKept ? costs[WINDOW * old + other - old - 1] : UNKNOWN;
       }
     }
   }
 
-  /** True for a splat that has taken another in in this round. */
+  /** Whether a splat has absorbed another in this round. */
   #isMerged(k: number): boolean {
     const partner = this.#best[k];
     return this.#partOf[partner] === k;
   }
 
-  /** Cost of the dearest pair that is merged in this round. */
+  /** Cost of the most expensive pair that is merged in this round. */
   #dearest(count: number, most: number): number {
     const costs = this.#pairCosts;
     let pairs = 0;

@@ -2,10 +2,10 @@ import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian
 import { constants } from '../generated/shaders.js';
 import { scaleRotationFactor } from '../pack/factor.js';
 
-/** Numbers of the lower triangular root of a covariance: xx, yx, yy, zx, zy, zz. */
+/** Entries of the lower triangular root of a covariance: xx, yx, yy, zx, zy, zz. */
 export const FACTOR_NUMBERS = 6;
 
-/** What a coarser level is made of: splats in an order in which neighbours in space are mostly neighbours. */
+/** Source of a coarser level: splats in an order that keeps neighbors in space mostly adjacent. */
 export interface LevelSource {
   readonly count: number;
   /** [N, 3] world units, relative to the origin of the cloud. */
@@ -14,10 +14,10 @@ export interface LevelSource {
   readonly factors: Float32Array;
   /** [N] opacities; those of merged splats may exceed 1 (see `opacityOfCover`). */
   readonly opacities: Float32Array;
-  /** [N] mean square displacement of what each splat stands for, in world units². */
+  /** [N] mean squared displacement of the splats that each splat represents, in world units². */
   readonly spreads: Float32Array;
   readonly shDegree: ShDegree;
-  /** What the renderer adds to screen variances without taking it from opacities, in px²: see `mergePair`. */
+  /** Variance in px² that the renderer adds on the screen without compensating opacities: see `mergePair`. */
   readonly dilation: number;
   /** Writes the harmonics of `count` splats from `first` on, {@link shNumbers} of each, to the start of `out`. */
   readonly readSh: (first: number, count: number, out: Float32Array) => void;
@@ -27,17 +27,17 @@ export interface LevelSource {
 export interface SplatLevel extends LevelSource {
   /** Spherical harmonics, {@link shNumbers} of each splat. */
   readonly sh: Float32Array;
-  /** Where in `sh`, in splats, those of each splat lie; undefined if in order. */
+  /** Index in `sh`, in splats, of the harmonics of each splat; undefined if in order. */
   readonly shOrder?: Uint32Array;
 }
 
-/** Spherical-harmonics numbers of one splat. */
+/** Number of spherical harmonics coefficients of one splat, over all channels. */
 export const shNumbers = (degree: ShDegree): number => 3 * shCoefficientCount(degree);
 
-/** Chunks of a level. */
+/** Number of chunks of a level. */
 export const chunksOf = (splats: number): number => Math.ceil(splats / constants.CULL_GROUP);
 
-/** Room for a level of merged splats. */
+/** Allocates a level of merged splats. */
 export function emptyLevel(count: number, { shDegree, dilation }: LevelSource): SplatLevel {
   const stride = shNumbers(shDegree);
   const sh = new Float32Array(stride * count);

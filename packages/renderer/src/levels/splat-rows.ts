@@ -1,21 +1,24 @@
 /**
- * Splats while they are merged, {@link ROW} float64 numbers of each in one piece: pairs of near neighbours are compared by the million, and then lie
- * next to each other. The constants are places in a row.
+ * Splats during merging, {@link ROW} contiguous float64 numbers each, because pairs of near neighbors are compared by
+ * the million. The constants are indices in a row.
  */
 export const ROW = 16;
 
 export const [X, Y, Z] = [0, 1, 2] as const;
 /** Covariance, and its trace. */
 export const [XX, YY, ZZ, XY, XZ, YZ, TRACE] = [3, 4, 5, 6, 7, 8, 9] as const;
-/** Mean colour, of degree 0 alone. */
+/** Mean color, of degree 0 only. */
 export const [RED, GREEN, BLUE] = [10, 11, 12] as const;
-/** What a splat weighs in every mean: opacity times area of the splats that it stands for. */
+/** Weight of a splat in every mean: opacity times area, summed over the splats that it represents. */
 export const MASS = 13;
 export const OPACITY = 14;
-/** Mean square displacement so far. */
+/** Accumulated mean squared displacement. */
 export const SPREAD = 15;
 
-/** Area of the splat at `p`, its variances larger by `low`, in units of 2π: the sum of what the three axes see. */
+/**
+ * Area of the splat at `p` with its variances increased by `low`, in units of 2π: the sum of the projections along the
+ * three axes.
+ */
 export function areaOf(rows: Float64Array, p: number, low = 0): number {
   const xx = rows[p + XX] + low;
   const yy = rows[p + YY] + low;
@@ -30,7 +33,7 @@ export function areaOf(rows: Float64Array, p: number, low = 0): number {
   );
 }
 
-/** Writes a covariance from its lower triangular root, which is at `at` of `factors` as xx, yx, yy, zx, zy, zz. */
+/** Writes a covariance from its lower triangular root at `at` of `factors` in the order xx, yx, yy, zx, zy, zz. */
 export function covarianceOf(factors: Float32Array | Float64Array, at: number, rows: Float64Array, p: number): void {
   const xx = factors[at];
   const yx = factors[at + 1];
@@ -47,7 +50,7 @@ export function covarianceOf(factors: Float32Array | Float64Array, at: number, r
   rows[p + TRACE] = rows[p + XX] + rows[p + YY] + rows[p + ZZ];
 }
 
-/** The root of a covariance (Cholesky); of flat splats and needles with zeros where rounding has left less than nothing. */
+/** Cholesky factor of a covariance; pivots of flat splats and needles that rounding has made negative become zero. */
 export function factorOf(rows: Float64Array, p: number, out: Float32Array, at: number): void {
   const xx = Math.sqrt(Math.max(0, rows[p + XX]));
   const inverseX = xx > 0 ? 1 / xx : 0;
@@ -63,7 +66,10 @@ export function factorOf(rows: Float64Array, p: number, out: Float32Array, at: n
   out[at + 5] = Math.sqrt(Math.max(0, rows[p + ZZ] - zx * zx - zy * zy));
 }
 
-/** Gives the splat at `i` the mean and the covariance of the two at `i` and `j`, which count for the shares `p` and 1 − `p`. */
+/**
+ * Sets the mean and the covariance of the splat at `i` to those of the mixture of `i` and `j` with weights `p` and 1 −
+ * `p`.
+ */
 export function joinMoments(rows: Float64Array, i: number, j: number, p: number): void {
   const q = 1 - p;
   const dx = rows[j + X] - rows[i + X];

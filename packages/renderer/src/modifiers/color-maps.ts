@@ -8,22 +8,22 @@ export const UNCHANGED: ColorMap = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 /** Luma of ITU-R BT.709. */
 const LUMA = [0.2126, 0.7152, 0.0722];
 
-/** A map in part. @param amount 0 to 1 */
+/** Interpolates between the identity and a map. @param amount 0 to 1 */
 const partly = (map: ColorMap, amount: number): ColorMap =>
   map.map((value, k) => UNCHANGED[k] + amount * (value - UNCHANGED[k]));
 
-/** Shades of one color in place of all colors; shades of gray with white. */
+/** Replaces all colors by shades of one color; white gives shades of gray. */
 export const tinted = (color: Vector3, amount: number): ColorMap =>
   partly(
     color.flatMap((channel) => [...LUMA.map((weight) => channel * weight), 0]),
     amount,
   );
 
-/** Toward white, or with an amount below 0 toward black. @param amount -1 to 1 */
+/** Moves colors toward white, or toward black for an amount below 0. @param amount -1 to 1 */
 export const lightened = (amount: number): ColorMap =>
   partly(amount < 0 ? UNCHANGED.map(() => 0) : UNCHANGED.map((_, k) => (k % 4 === 3 ? 1 : 0)), Math.abs(amount));
 
-/** Turns hues, as `hue-rotate` of CSS does (W3C Filter Effects). @param angle radians */
+/** Rotates hues, like `hue-rotate` of CSS (W3C Filter Effects). @param angle radians */
 export function recolored(angle: number, amount = 1): ColorMap {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
   const map = [

@@ -10,26 +10,29 @@ export const CUT_SHAPES = ['box', 'sphere', 'cylinder', 'plane'] as const;
 /** A unit cube, or a sphere or a cylinder (axis y) of diameter and height 1, about the origin; or all that lies below the plane y = 0. */
 export type CutShape = (typeof CUT_SHAPES)[number];
 
-/** A part of space in which splats are drawn otherwise. A splat at its edge changes by the share of it that lies inside. */
+/** Changes splats in a region of space. A splat at its edge changes by the fraction that lies inside. */
 export interface SplatCut {
   readonly shape: CutShape;
-  /** Row-major 4x4, last row (0, 0, 0, 1): from the shape's coordinates to the world. */
+  /** Row-major 4x4, last row (0, 0, 0, 1): from shape coordinates to world coordinates. */
   readonly shapeToWorld: Matrix4;
-  /** Which side of the surface changes. Default: `inside`. */
+  /** Side of the surface that changes. Default: `inside`. */
   readonly side?: 'inside' | 'outside' | undefined;
-  /** Standard deviation of the edge in world units, besides the splat's own; `hard` decides by the centers of splats. Default: 0. */
+  /**
+   * Standard deviation of the edge in world units, in addition to the splat's own; `hard` decides by the centers of
+   * splats. Default: 0.
+   */
   readonly edge?: number | 'hard' | undefined;
   /** Factor of the opacity, 0 to 1; 0 hides. Default: 1. */
   readonly opacity?: number | undefined;
-  /** Opacity of a surface that is opaque otherwise, 0 to 1, as `Placement.opacity`. Default: 1. */
+  /** Opacity of an otherwise opaque surface, 0 to 1, same as `Placement.opacity`. Default: 1. */
   readonly surfaceOpacity?: number | undefined;
-  /** Default: colors stay as they are. */
+  /** Default: colors are unchanged. */
   readonly color?: ColorMap | undefined;
   /** Displacement in world units. Default: none. */
   readonly offset?: Vector3 | undefined;
 }
 
-/** Each by its name: an access by a computed one would keep all constants in the bundle. */
+/** Accessed by literal names, because a computed access would keep all constants in the bundle. */
 const NUMBERS: Readonly<Record<CutShape, number>> = {
   box: constants.CUT_BOX,
   sphere: constants.CUT_SPHERE,
@@ -37,13 +40,13 @@ const NUMBERS: Readonly<Record<CutShape, number>> = {
   plane: constants.CUT_PLANE,
 };
 
-/** In place of the map to a shape that has no volume: everything lies outside. */
+/** Map to a shape without volume: everything is outside. */
 const NOWHERE = [0, 0, 0, 1e6];
 
 /**
- * A cut as the shaders want it.
- * @param toWorld from page-local coordinates
- * @param toLocal its inverse
+ * Converts a cut to the layout of the shaders.
+ * @param toWorld From block-local coordinates.
+ * @param toLocal Its inverse.
  */
 export function cutValues(cut: SplatCut, toWorld: Matrix4, toLocal: Matrix4): StructValues<typeof ModifierCut> {
   const { shape, side, edge = 0, opacity = 1, surfaceOpacity = 1, color = UNCHANGED, offset = [0, 0, 0] } = cut;
@@ -64,11 +67,11 @@ export function cutValues(cut: SplatCut, toWorld: Matrix4, toLocal: Matrix4): St
   };
 }
 
-/** A direction through the linear part of a matrix. */
+/** Transforms a direction by the linear part of a matrix. */
 export const directionIn = (m: Matrix4, [x, y, z]: Vector3): number[] =>
   [0, 1, 2].map((k) => m[4 * k] * x + m[4 * k + 1] * y + m[4 * k + 2] * z);
 
-/** By how much a matrix makes lengths longer: the cube root of what it does to volumes. */
+/** Mean scale factor of a matrix: the cube root of its scale of volumes. */
 function sizeOf(m: Matrix4): number {
   const determinant =
     m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);

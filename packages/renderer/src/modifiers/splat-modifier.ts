@@ -9,36 +9,36 @@ import { cutValues, directionIn, type SplatCut } from './cuts.js';
 import type { SplatProgram } from './splat-program.js';
 import type { SplatUniform } from './splat-shader.js';
 
-/** Most cuts of one scene. */
+/** Maximum number of cuts of one scene. */
 export const MOST_CUTS: number = constants.MOST_CUTS;
 
-/** What a {@link SplatModifier} does. */
+/** Changes that a {@link SplatModifier} applies. */
 export interface SplatChanges {
   /** At most 16. */
   readonly cuts?: readonly SplatCut[] | undefined;
-  /** How large the scene is by now: 1 for whole, 0 for nothing, about {@link center}. Default: 1. */
+  /** Scale of the scene about {@link center}: 1 is complete, 0 is nothing. Default: 1. */
   readonly grown?: number | undefined;
-  /** Where it grows from: world. Default: the origin. */
+  /** Center of the growth in world coordinates. Default: the origin. */
   readonly center?: Vector3 | undefined;
-  /** Share of the splats that are drawn, larger for it so that they stand for all: 0 for none, 1 for all. Default: 1. */
+  /** Fraction of the splats that are drawn, enlarged to represent all: 0 for none, 1 for all. Default: 1. */
   readonly share?: number | undefined;
   /** Values of the uniforms of the program's shader. */
   readonly uniforms?: Readonly<Record<string, SplatUniform>> | undefined;
   /** Seconds. Default: 0. */
   readonly time?: number | undefined;
-  /** Rotation from the world to the space that the program's shader reckons in, row-major 4x4. Default: none. */
+  /** Rotation from world space to the space of the program's shader, row-major 4x4. Default: none. */
   readonly worldToViewer?: Matrix4 | undefined;
 }
 
 const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-/** Cuts, tints, reveals and moves the splats of one placement. To change what it does is to write one uniform buffer. */
+/** Cuts, tints, reveals and moves the splats of one placement. A change writes one uniform buffer. */
 export class SplatModifier implements PlacementModifier {
   readonly values: GPUBuffer;
   readonly program: SplatProgram;
   readonly #device: GPUDevice;
   readonly #bytes = new ArrayBuffer(Modifiers.size);
-  /** What was written last. */
+  /** The last written values. */
   readonly #written = new Uint32Array(Modifiers.size / 4);
 
   constructor(device: GPUDevice, program: SplatProgram) {
@@ -56,7 +56,7 @@ export class SplatModifier implements PlacementModifier {
     return this.program.reading(kind);
   }
 
-  /** Writes what is to be done, for the frames that are drawn next. @returns whether that is another than before */
+  /** Writes the changes for the next frames. @returns Whether they differ from the previous ones. */
   write(changes: SplatChanges, { scene, sceneToWorld = IDENTITY }: Placement): boolean {
     const { cuts = [], grown = 1, center = [0, 0, 0], share = 1, time = 0, uniforms = {}, worldToViewer } = changes;
     const [x, y, z] = scene.origin;
@@ -96,7 +96,7 @@ export class SplatModifier implements PlacementModifier {
   }
 }
 
-/** A uniform in a vector of four finite numbers. */
+/** Pads a uniform to a vector of four finite numbers. */
 function fourOf(value: SplatUniform): number[] {
   const numbers = typeof value === 'number' ? [value] : value;
   return [0, 1, 2, 3].map((k) => (Number.isFinite(numbers[k]) ? numbers[k] : 0));

@@ -22,18 +22,18 @@ const QUANTIZED: Required<GeometryReading> = {
   probeSurface: modified.probeSurfaceQuantizedModified,
 };
 
-/** The part that a page's function takes the place of, and its name there. */
+/** The module that a hook replaces, and the name of its function. */
 const HOOK = modified.sharedSplatHookPart;
 const [, HOOK_NAME] = /\bfn (\w+)/.exec(HOOK)!;
 
-/** Of the names of shaders with a function in them: several may be compiled at a time. */
+/** Counter for unique names of shaders with a hook, because several may be compiled at once. */
 let hooks = 0;
 
-/** Programs of a device by the code of the page's function and the types of its uniforms; '' for none. */
+/** Programs of a device by the code of the hook and the types of its uniforms; '' for none. */
 const programsOn = (device: GPUDevice): Map<string, SplatProgram> =>
   perDevice(device, 'splat programs', () => new Map<string, SplatProgram>());
 
-/** Shaders that cut, reveal and move splats, with a page's own function or without one. */
+/** Shaders that cut, reveal and move splats, with or without a hook. */
 export class SplatProgram {
   readonly shader: SplatShader | undefined;
   readonly #device: GPUDevice;
@@ -48,9 +48,9 @@ export class SplatProgram {
   }
 
   /**
-   * Compiles the shaders beside the frames, or finds those that are there.
-   * @param scenes that they are for
-   * @throws GaussianSplatError `argument/splat-shader` for a function that does not compile: `found` names the line
+   * Compiles the shaders concurrently with frames, or returns compiled ones.
+   * @param scenes The scenes to draw with them.
+   * @throws GaussianSplatError `argument/splat-shader` for a hook that does not compile: `found` names the line.
    */
   static async compile(
     device: GPUDevice,
@@ -75,7 +75,7 @@ export class SplatProgram {
     return kind ? this.#quantized : this.#packed;
   }
 
-  /** Makes the pipelines that frames of these scenes need, unless they are there. */
+  /** Compiles the missing pipelines for frames of these scenes. */
   prepare(scenes: readonly GaussianScene[]): Promise<void> {
     const kinds = new Set(scenes.flatMap(({ pages }) => pages.map(({ reading }) => reading)));
     const { threads } = variantsOf(this.#device);
@@ -89,7 +89,7 @@ export class SplatProgram {
   }
 }
 
-/** A page's function in the shaders of a reading. */
+/** Inserts a hook into the shaders of a geometry. */
 function hooked(reading: Required<GeometryReading>, shader: SplatShader, key: string): Required<GeometryReading> {
   const withHook = <S extends ShaderDescription>(stage: S): S => {
     if (!stage.code.includes(HOOK)) return stage;

@@ -1,25 +1,31 @@
-/** The WGSL function of a page: checked, given names that meet no others, and put behind the function that the stages call. */
+/**
+ * The WGSL hook of a page: validated, renamed to avoid collisions, and inserted after the function that the stages
+ * call.
+ */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 
-/** A uniform of a page's function: a number, or a vector of 2 to 4. */
+/** A uniform of a hook: a number, or a vector of 2 to 4. */
 export type SplatUniform = number | readonly number[];
 
-/** A function of the page's own, for each splat: see docs/guide/effects.md. */
+/** A hook that runs for each splat: see docs/guide/effects.md. */
 export interface SplatShader {
   /** WGSL with a function `modify(splat: Splat, uniforms: Uniforms) -> Splat`. */
   readonly code: string;
-  /** Values of the fields of `Uniforms` by name, at most 8. Their names and sizes are part of the code; their values may change in each frame. */
+  /**
+   * Values of the fields of `Uniforms` by name, at most 8. Their names and sizes are part of the code; their values may
+   * change in each frame.
+   */
   readonly uniforms?: Readonly<Record<string, SplatUniform>> | undefined;
-  /** Whether `uniforms.time` goes on by itself. Default: false. */
+  /** Whether `uniforms.time` advances automatically. Default: false. */
   readonly animated?: boolean | undefined;
-  /** Whether positions and sizes change; with false whole chunks out of view are passed over. Default: true. */
+  /** Whether positions and sizes change; false allows culling of whole chunks. Default: true. */
   readonly moves?: boolean | undefined;
 }
 
 const TYPES = ['', 'f32', 'vec2f', 'vec3f', 'vec4f'];
 const sizeOf = (value: SplatUniform): number => (typeof value === 'number' ? 1 : value.length);
-/** What would make an interface with the outside of the module. */
+/** Declarations that would connect the module to the outside. */
 const FORBIDDEN = /@\s*(group|binding|compute|vertex|fragment|id)\b|\b(enable|requires|override)\s|\bvar\s*</;
 const DECLARED = /\b(?:fn|struct|alias|const)\s+([A-Za-z_]\w*)/g;
 const NAME = /^[A-Za-z]\w*$/;
@@ -35,10 +41,10 @@ const withoutComments = (code: string): string =>
   code.replace(/\/\*[^]*?\*\/|\/\/.*/g, (comment) => comment.replace(/[^\n]/g, ' '));
 
 /**
- * The text of the hook.
- * @param name of the function that the stages call
- * @param others the text of a stage, whose names the page's own must not meet
- * @param mostValues parameters of the array of values
+ * Returns the text of the hook.
+ * @param name Name of the function that the stages call.
+ * @param others Text of a stage, whose names the hook must not redeclare.
+ * @param mostValues Parameter count of the array of values.
  * @throws GaussianSplatError `argument/splat-shader`
  */
 export function hookText({ code, uniforms = {} }: SplatShader, name: string, others: string): string {
@@ -57,7 +63,7 @@ export function hookText({ code, uniforms = {} }: SplatShader, name: string, oth
   const fields = entries.map(([key, value]) => `${key}: ${TYPES[sizeOf(value)]},`);
   const values = entries.map(([, value], k) => `, v[${k}]${['', '.x', '.xy', '.xyz', ''][sizeOf(value)]}`);
   const most = constants.MOST_VALUES;
-  // The page's text begins a line of its own, so that lines of errors can be counted.
+  // The text of the page starts on a new line, so that line numbers in errors can be converted.
   return [
     'struct Splat { position: vec3f, color: vec3f, opacity: f32, scale: f32 }',
     `struct Uniforms { time: f32, ${fields.join(' ')} }`,
@@ -69,10 +75,10 @@ export function hookText({ code, uniforms = {} }: SplatShader, name: string, oth
   ].join('\n');
 }
 
-/** Lines before the page's own text in {@link hookText}. */
+/** Lines in front of the page's text in {@link hookText}. */
 const LINES_BEFORE = 6;
 
-/** With other names in place of those that a page declares and the stage's text has, too. */
+/** Renames declarations of a page that the text of the stage has, too. */
 function renamed(own: string, others: string): string {
   const words = new Set(others.match(/[A-Za-z_]\w*/g));
   const declared = new Set([...own.matchAll(DECLARED)].map(([, name]) => name));
@@ -83,9 +89,9 @@ function renamed(own: string, others: string): string {
 const lineAt = (text: string, index: number): string => ` in line ${text.slice(0, index).split('\n').length}`;
 
 /**
- * Compiles a stage with a hook, and says what is wrong with it.
- * @param before the stage's text before the hook's
- * @throws GaussianSplatError `argument/splat-shader` that names the line of the page's text
+ * Compiles a stage with a hook, and reports its errors.
+ * @param before Text of the stage in front of the hook.
+ * @throws GaussianSplatError `argument/splat-shader` that names the line of the page's text.
  */
 export async function requireCompiles(device: GPUDevice, code: string, before: string): Promise<void> {
   device.pushErrorScope('validation');

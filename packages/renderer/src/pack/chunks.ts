@@ -4,13 +4,13 @@ import { CHUNK_NUMBERS } from './words.js';
 
 const { CULL_GROUP, ALPHA_MIN } = constants;
 
-/** How far a splat reaches from its centre with an alpha of at least 1/255 along its longest axis, world units. */
+/** Reach of a splat from its center with an alpha of at least 1/255 along its longest axis, world units. */
 export function reachOf({ scales, opacities }: Pick<GaussianCloud, 'scales' | 'opacities'>, i: number): number {
   const longest = Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]);
   return longest * Math.sqrt(2 * Math.log(Math.max(1, Math.min(1, opacities[i]) / ALPHA_MIN)));
 }
 
-/** Bounds of each run of 256 splats: the box of their centres, and the farthest that any of them reaches. */
+/** Bounds of each run of 256 splats: the box of their centers, and their largest reach. */
 export function boundChunks(cloud: GaussianCloud, kept: Uint32Array): Float32Array {
   const { positions } = cloud;
   const chunks = new Float32Array(CHUNK_NUMBERS * Math.ceil(kept.length / CULL_GROUP));

@@ -1,15 +1,16 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
 /**
- * The lower triangular root L of a splat's covariance Σ = L Lᵀ, into `out` as xx, yx, yy, zx, zy, zz (world units).
+ * Writes the lower triangular root L of a splat's covariance Σ = L Lᵀ into `out` as xx, yx, yy, zx, zy, zz (world
+ * units).
  *
- * Found by orthogonalising the rows of R S, never from Σ itself: Σ holds the squares of the axes, and with them a needle
+ * Computed by orthogonalizing the rows of R S, never from Σ itself: Σ contains the squares of the axes, so a needle
  * would lose twice the digits.
  */
 export function scaleRotationFactor({ rotations, scales }: GaussianCloud, i: number, out: Float64Array): void {
   const [sx, sy, sz] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
   let [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
-  // Divided by the largest first: squares of tiny or huge components would leave float64's range.
+  // Divided by the largest first, because squares of tiny or huge components would leave the range of float64.
   const largest = Math.max(Math.abs(w), Math.abs(x), Math.abs(y), Math.abs(z));
   [w, x, y, z] = [w / largest, x / largest, y / largest, z / largest];
   const unit = 1 / Math.sqrt(w * w + x * x + y * y + z * z);
@@ -26,7 +27,7 @@ export function scaleRotationFactor({ rotations, scales }: GaussianCloud, i: num
   let cy = 2 * (y * z + w * x) * sy;
   let cz = (1 - 2 * (x * x + y * y)) * sz;
 
-  // A row of length 0 is orthogonal to everything: its inverse length may as well be 0.
+  // A row of length 0 is orthogonal to everything, so its inverse length is set to 0.
   const xx = Math.sqrt(ax * ax + ay * ay + az * az);
   const inverseX = xx > 0 ? 1 / xx : 0;
   const yx = (ax * bx + ay * by + az * bz) * inverseX;

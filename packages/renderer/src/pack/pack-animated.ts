@@ -2,11 +2,11 @@ import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import { packSh } from './sh.js';
 import { shWords } from './words.js';
 
-/** Attributes that change, in the order of shaders/animate.wgsl. */
+/** Animated attributes, in the order of shaders/animate.wgsl. */
 const ATTRIBUTES = ['position', 'rotation', 'scale', 'opacity', 'color'] as const;
 type Attribute = (typeof ATTRIBUTES)[number];
 
-/** What splats do in some frames: `Motion` of the package formats. */
+/** Motion of splats over some frames: `Motion` of the package formats. */
 export interface Motions {
   readonly frames: number;
   readonly parts: Readonly<
@@ -22,15 +22,18 @@ export interface Motions {
       }
     >
   >;
-  /** Frames that each splat is in; undefined: all. */
+  /** Frames that contain each splat; undefined: all. */
   readonly lives?: { readonly first: Uint16Array; readonly end: Uint16Array } | undefined;
 }
 
-/** Splats and what they do in the bytes that the GPU reads. Plain data with transferable buffers, so that a worker can make it. */
+/**
+ * Splats and their motion in the bytes that the GPU reads. Plain data with transferable buffers, so that a worker can
+ * build it.
+ */
 export interface PackedAnimation {
   readonly rows: number;
   readonly frames: number;
-  /** Curves of each attribute. */
+  /** Number of curves of each attribute. */
   readonly ranks: readonly number[];
   /** [rows, {@link BASE_WORDS}] words: `Base` of shaders/animate.wgsl. */
   readonly bases: Uint32Array;
@@ -38,7 +41,7 @@ export interface PackedAnimation {
   readonly sh: Uint32Array;
   /** [planes, rows made even / 2] words. */
   readonly codes: Uint32Array;
-  /** [frames, sum of ranks], times steps. */
+  /** [frames, sum of ranks], multiplied by the quantization steps. */
   readonly curves: Float32Array;
 }
 
@@ -47,7 +50,7 @@ export const BASE_WORDS = 12;
 /** Codes of a plane in memory: an even number. */
 export const planeCodes = (rows: number): number => rows + (rows & 1);
 
-/** @param origin that positions become relative to */
+/** @param origin Origin of the packed positions. */
 export function packAnimation(cloud: GaussianCloud, motions: Motions, origin: Vector3): PackedAnimation {
   const { frames, parts } = motions;
   const rows = cloud.count;
@@ -105,7 +108,7 @@ export function animationBytes({
   };
 }
 
-/** What a part may have. */
+/** Capacity of a part. */
 export interface AnimationRoom {
   readonly rows: number;
   readonly planes: number;

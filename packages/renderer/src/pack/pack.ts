@@ -14,12 +14,13 @@ import { recentred } from './recentre.js';
 import { choosePrecision, noiseIn, packSh } from './sh.js';
 import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision } from './words.js';
 
-/** How {@link packGaussians} lays out a cloud. */
+/** Options of {@link packGaussians}. */
 export interface PackOptions {
   /**
-   * Precision of the spherical harmonics. `int8` keeps eight bits and a scale for each band of each splat, and float16 for the
-   * mean colour; `float16` takes nearly twice the memory. `auto`, the default, is `int8` wherever its rounding stays
-   * 62 dB below white a splat over all of them, 75 dB and more in images, and 50 dB in each 256 neighbours. docs/decisions/0008 has the figures.
+   * Precision of the spherical harmonics. `int8` keeps eight bits and a scale for each band of each splat, and float16
+   * for the mean color; `float16` takes nearly twice the memory. `auto`, the default, is `int8` if its rounding error
+   * stays below -62 dB per splat over all of them, 75 dB PSNR and more in images, and 50 dB in each 256 neighbors.
+   * docs/decisions/0008 has the figures.
    */
   readonly sh?: ShPrecision | 'auto';
 }
@@ -30,7 +31,7 @@ export interface PackedHead {
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly droppedCount: number;
@@ -38,9 +39,7 @@ export interface PackedHead {
   readonly leafCount?: number;
 }
 
-/**
- * A cloud in the exact bytes that the GPU reads. Plain data with transferable buffers, so that a worker can make it.
- */
+/** A cloud in the exact bytes that the GPU reads. Plain data with transferable buffers, so that a worker can build it. */
 export interface PackedGaussians extends PackedHead {
   /** [N, 8] words: `PackedGaussian` of shaders/shared/packed_gaussian.wgsl. */
   readonly geometry: Uint32Array;
@@ -48,7 +47,7 @@ export interface PackedGaussians extends PackedHead {
   readonly sh: Uint32Array;
   /** [ceil(N / 256), 8] numbers: `Chunk` of shaders/cull_chunks.wgsl. */
   readonly chunks: Float32Array;
-  /** [ceil(N / 256), 12] numbers, if there are levels of detail: `ChunkDetail` of shaders/shared/detail.wgsl. */
+  /** [ceil(N / 256), 12] numbers, if there are levels of detail: `ChunkLod` of shaders/shared/lod.wgsl. */
   readonly details?: Float32Array;
 }
 
@@ -57,14 +56,16 @@ const { ALPHA_MIN } = constants;
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 float[0] = ALPHA_MIN;
-/** The least 28 bits of a float32 that stand for at least 1/255. */
+/** Smallest 28-bit prefix of a float32 that represents at least 1/255. */
 const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
 
 /**
- * Packs a cloud for {@link GaussianBuffers.upload}: neighbours in space become neighbours in memory, 32 bytes of geometry a
- * splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its spherical
- * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`. Of a cloud with `levelRuns` all splats are drawn; `packLevelRuns` chooses.
- * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`; `argument/value` for an unknown precision.
+ * Packs a cloud for {@link GaussianBuffers.upload}: neighbors in space become neighbors in memory, with 32 bytes of
+ * geometry for each splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its
+ * spherical harmonics. Splats that `isUsable` of core rejects are dropped and added to `droppedCount`. A cloud with
+ * `levelRuns` is drawn completely; `packLevelRuns` selects levels.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`; `argument/value` for
+ * an unknown precision.
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(given);
@@ -88,7 +89,7 @@ function unknownPrecision(found: unknown): GaussianSplatError {
   });
 }
 
-/** The bytes of some splats of a cloud, in that order. */
+/** Packs some splats of a cloud, in the given order. */
 export function packKept(
   cloud: GaussianCloud,
   kept: Uint32Array,
@@ -106,7 +107,7 @@ export function packedOrder(cloud: GaussianCloud): Uint32Array {
   return mortonOrder(cloud.positions, usableIndices(cloud));
 }
 
-/** Indices of the splats that can be drawn, ascending. */
+/** Indices of the drawable splats, ascending. */
 export function usableIndices(cloud: GaussianCloud): Uint32Array {
   const indices = new Uint32Array(cloud.count);
   let kept = 0;
@@ -114,7 +115,7 @@ export function usableIndices(cloud: GaussianCloud): Uint32Array {
   return indices.subarray(0, kept);
 }
 
-/** Their geometry alone. */
+/** Packs their geometry only. */
 export function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
   const words = new Uint32Array(kept.length * GEOMETRY_WORDS);
   const floats = new Float32Array(words.buffer);
@@ -131,19 +132,22 @@ export function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Arr
   return words;
 }
 
-/** The highest bits of the float32 of a number, to the nearest; the rest is cut off. */
+/** Rounds to the highest bits of a float32; the rest is cut off. */
 function highBits(value: number, count: number): number {
   float[0] = value;
   return (bits[0] + (1 << (31 - count))) >>> (32 - count);
 }
 
-/** The 28 highest bits of an opacity, on the same side of 1/255 as the opacity: splats below it are not drawn. */
+/** The 28 highest bits of an opacity, on the same side of 1/255 as the opacity, because splats below it are not drawn. */
 function opacityBits(opacity: number): number {
   const nearest = highBits(Math.max(0, opacity), 28);
   return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
 }
 
-/** Five words, of a factor and an opacity (above 1 only of merged splats): in the upper 22 bits of each a number of the factor, in the lower 10 a part of the sixth and of the opacity. */
+/**
+ * Writes five words of a factor and an opacity (above 1 only for merged splats): the upper 22 bits of each hold an
+ * entry of the factor, the lower 10 a part of the sixth and of the opacity.
+ */
 export function packShape(words: Uint32Array, at: number, factor: Float64Array, opacity: number): void {
   const last = highBits(factor[5], 22);
   const visible = opacityBits(opacity);

@@ -16,9 +16,10 @@ const notWhole = (): GaussianSplatError =>
   });
 
 /**
- * Reads a scene back from the GPU as it was packed: for tools that make another one of it. Scenes that generators write cannot be read.
- * Rejects if the device is lost meanwhile, and with GaussianSplatError `argument/value` for a scene that is streamed.
- * @param check called before each of its buffers is read, which takes turns of the page: throws if they have been freed meanwhile
+ * Reads a packed scene back from the GPU, for tools that derive another one. Scenes of generators cannot be read.
+ * Rejects if the device is lost meanwhile, and with GaussianSplatError `argument/value` for a streamed scene.
+ * @param check Called before each of its buffers is read, which takes several tasks: throws if they were freed
+ * meanwhile.
  */
 export async function readPacked(
   device: GPUDevice,

@@ -8,7 +8,10 @@ interface Items {
 
 const itemsOf = (count: number): Items => ({ values: new Uint32Array(count), keys: new Uint32Array(count) });
 
-/** Returns values in ascending order of their keys, equal keys in their order: radix sort, 11 bits a pass. Its arguments stay as they are. */
+/**
+ * Returns values in ascending order of their keys, equal keys in their order: radix sort, 11 bits in each pass. The
+ * arguments are not modified.
+ */
 export function sortByKey(values: Uint32Array, keys: Uint32Array): Uint32Array {
   let from: Items = { values, keys };
   let to = itemsOf(values.length);
@@ -20,7 +23,7 @@ export function sortByKey(values: Uint32Array, keys: Uint32Array): Uint32Array {
   return from.values;
 }
 
-/** Puts items in the order of a digit, and of equal digits in the order that they had. */
+/** Sorts items by a digit (stable). */
 function moveByDigit({ values, keys }: Items, to: Items, shift: number): void {
   const starts = new Uint32Array(DIGITS + 1);
   for (const key of keys) starts[((key >>> shift) & (DIGITS - 1)) + 1]++;

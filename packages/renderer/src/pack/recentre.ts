@@ -1,13 +1,17 @@
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 
-/** Positions sampled for the middle and the extent of a cloud. */
+/** Number of positions that are sampled for the center and the extent of a cloud. */
 const SAMPLE = 4096;
-/** How many times its own extent a cloud may lie away from its origin. At 16 a pixel is still met to thousandths. */
+/**
+ * Maximum distance of a cloud from its origin, in units of its own extent. At 16 a pixel is still accurate to
+ * thousandths.
+ */
 const FAR = 16;
 
 /**
- * The cloud with its origin moved among its splats, in float64, if they lie far from it: a file may hold float32 coordinates of a million,
- * and a camera's matrix in float32 would then round the whole image to their steps. Clouds near their origin are returned as they are.
+ * Returns the cloud with its origin moved among its splats, in float64, if they lie far from it: a file may hold
+ * float32 coordinates of a million, and a camera matrix in float32 would then round the whole image to their steps.
+ * Clouds near their origin are returned unchanged.
  */
 export function recentred(cloud: GaussianCloud): GaussianCloud {
   const columns = [0, 1, 2].map((axis) => sampleOf(cloud, axis));

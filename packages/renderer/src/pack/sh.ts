@@ -4,24 +4,27 @@ import { type ShPrecision, shWords } from './words.js';
 
 /** Coefficients, three channels each, of bands 1, 2 and 3. */
 export const BAND_SIZES = [3, 5, 7] as const;
-/** Where the scale of each band lies, in bytes from the start of a splat. */
+/** Byte offset of the scale of each band in the data of a splat. */
 export const SCALE_BYTES = [6, 7, 53] as const;
 export const FIRST_CODE_BYTE = 8;
-/** A scale of code k is 2^(k / 8 - 16). */
+/** The scale of code k is 2^(k / 8 - 16). */
 export const SCALE_STEPS = 8;
 export const SCALE_BIAS = 16;
 const MAX_CODE = 255;
 const scaleOf = (code: number): number => 2 ** (code / SCALE_STEPS - SCALE_BIAS);
 
-/** PSNR of a single splat, rounded as `int8`, that {@link choosePrecision} asks for on average: images then lose no more than 75 dB of noise. */
+/**
+ * Average PSNR of a single splat, rounded as `int8`, that {@link choosePrecision} requires: images then have 75 dB PSNR
+ * or more.
+ */
 const INT8_NOISE_DB = 62;
-/** The same in every part of a scene: a picture of that part alone then has some 63 dB. */
+/** The same in every block of neighbors: an image of that block alone then has about 63 dB. */
 const INT8_PART_DB = 50;
-/** Splats of a part, neighbours where they are in packed order, and how many of them are looked at. */
+/** Neighboring splats in a block, adjacent in packed order, and the number of samples among them. */
 export const PART = 256;
 const PART_SAMPLES = 8;
 
-/** What rounding to `int8` does to the colour of a splat, as a variance. */
+/** Variance of a splat's color from rounding to `int8`. */
 export type NoiseOf = (splat: number) => number;
 
 /** {@link NoiseOf} the splats of a cloud. */
@@ -41,8 +44,9 @@ export function noiseIn({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>
 }
 
 /**
- * `int8` where it is precise enough, in the scene as a whole and in each of its parts: coefficients are rounded to within s / 254, s the scale of their band, evenly spread; seen from a
- * random direction, band b adds up to a variance of (s / 127)² / 12 · (2b + 1) / 4π.
+ * Returns `int8` if it is precise enough, in the whole scene and in each block of neighbors: coefficients are rounded
+ * to within s / 254, s the scale of their band, evenly distributed; from a random direction, band b adds a variance of
+ * (s / 127)² / 12 · (2b + 1) / 4π.
  */
 export function choosePrecision(noiseOf: NoiseOf, kept: Uint32Array): ShPrecision {
   const parts = Math.max(1, Math.round(kept.length / PART));
@@ -58,12 +62,12 @@ export function choosePrecision(noiseOf: NoiseOf, kept: Uint32Array): ShPrecisio
   return precisionFor(sum / parts, worst);
 }
 
-/** The precision of a scene by the mean noise of all its splats, and of those of the noisiest of its parts. */
+/** Precision of a scene by the mean noise of all its splats, and of those of its noisiest block. */
 export function precisionFor(mean: number, worst: number): ShPrecision {
   return mean <= 10 ** (-INT8_NOISE_DB / 10) && worst <= 10 ** (-INT8_PART_DB / 10) ? 'int8' : 'float16';
 }
 
-/** The noise of a splat of a part, in the mean of some. */
+/** Mean noise over a sample of the splats of a block. */
 function meanNoise(noiseOf: NoiseOf, kept: Uint32Array, first: number, end: number): number {
   const step = Math.max(1, Math.floor((end - first) / PART_SAMPLES));
   let noise = 0;
@@ -79,10 +83,10 @@ export const CODE_NOISE = Float64Array.from(
 );
 
 /**
- * The coefficients of the splats `kept`, in the order [coefficient][channel], padded to 8 bytes a splat.
+ * Packs the coefficients of the splats `kept`, in the order [coefficient][channel], padded to 8 bytes for each splat.
  *
- * `float16`: all of them. `int8`: the three of degree 0 in float16, then for each band a scale (the largest magnitude of the
- * band, rounded up to an eighth of an octave) and its coefficients as shares of that scale in 1/127.
+ * `float16`: all of them. `int8`: the three of degree 0 in float16, then for each band a scale (the largest magnitude
+ * of the band, rounded up to an eighth of an octave) and its coefficients as multiples of 1/127 of that scale.
  */
 export function packSh(cloud: GaussianCloud, kept: Uint32Array, precision: ShPrecision): Uint32Array {
   return precision === 'float16' ? packHalf(cloud, kept) : packInt8(cloud, kept);
@@ -100,7 +104,9 @@ function packHalf({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
   return new Uint32Array(halves.buffer);
 }
 
-/** What a coefficient is multiplied by to get its code, for each code of a scale: 0 for bands that are too small or too large for any. */
+/**
+ * Factor from a coefficient to its code, for each code of a scale: 0 for bands that are too small or too large for any.
+ */
 const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
   code && code < MAX_CODE ? 127 / scaleOf(code) : 0,
 );
@@ -122,7 +128,7 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
       const scaleCode = scaleCodeOf(bits, first, end);
       const perUnit = PER_UNIT[scaleCode];
       bytes[at + SCALE_BYTES[band]] = scaleCode;
-      // Degree 1 has nine codes and room for eight: the last takes the place of the scale of band 2.
+      // Degree 1 has nine codes but eight places: the last one replaces the scale of band 2.
       if (shDegree === 1) bytes[at + SCALE_BYTES[1]] = codeOf(sh[--end] * perUnit);
       while (first < end) bytes[code++] = codeOf(sh[first++] * perUnit);
     }
@@ -131,24 +137,30 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
   return words;
 }
 
-/** A share of the scale, in 1/127, to the nearest; the last of halves goes up. Truncation rounds down above 0, and bytes keep the lower 8 bits of a sum with 256. */
+/**
+ * Rounds to the nearest 1/127 of the scale, halves up. Truncation rounds down above 0, and bytes keep the lower 8 bits
+ * of a sum with 256.
+ */
 const codeOf = (value: number): number => (value + 256.5) | 0;
 
 const bitsOf = ({ buffer, byteOffset, length }: Float32Array): Int32Array => new Int32Array(buffer, byteOffset, length);
 
-/** The bits of the largest number that a scale is enough for. The small number: one that is a step itself must not be lifted to the next by rounding. */
+/**
+ * Bits of the largest number that a scale covers. The factor is slightly below 1 because a number equal to a step must
+ * not round up to the next one.
+ */
 const MOST_BITS = bitsOf(Float32Array.from({ length: MAX_CODE }, (_, code) => scaleOf(code + 1e-6)));
-/** The upper 12 bits of a float32, of a scale of code 0. */
+/** The upper 12 bits of a float32, for a scale of code 0. */
 const FIRST_EIGHTH = (127 - SCALE_BIAS) * SCALE_STEPS;
 
-/** The code of a scale for finite coefficients, given by their bits, whose order is that of magnitudes; 0 means all zeros. */
+/** Code of the scale for finite coefficients, given by their bits, which sort by magnitude; 0 means all zeros. */
 function scaleCodeOf(bits: Int32Array, first: number, end: number): number {
   let largest = 0;
   for (let k = first; k < end; k++) {
     const size = bits[k] & 0x7fffffff;
     if (size > largest) largest = size;
   }
-  // The logarithm of 1 + m, m in 0..1, is m or more, so the first is not too large.
+  // The first estimate is not too large, because log2(1 + m) is at least m for m in 0..1.
   let code = Math.max(0, (largest >>> 20) - FIRST_EIGHTH);
   while (largest > MOST_BITS[code]) code++;
   return Math.min(MAX_CODE, code);

@@ -1,6 +1,7 @@
 /**
- * Packing a scene by several threads. Each packs shares of its rows while the rest is on its way; splats are dealt into cells along the Z-order curve as shares come,
- * and the cells, now blocks of the scene, are sorted by several threads again.
+ * Packs a scene on several threads. Each packs shards of its rows while the rest is in transit; splats are distributed
+ * to cells along the Z-order curve as shards arrive, and the cells, now blocks of the scene, are sorted by several
+ * threads again.
  */
 import {
   boundsOf,
@@ -22,17 +23,20 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './word
 
 const { CULL_GROUP } = constants;
 
-/** Splats of a share at most. */
+/** Maximum number of splats in a shard. */
 export const SHARE_SPLATS = 1 << 14;
-/** Cells are told apart by the highest bits of codes along the curve. */
+/** Cells are identified by the highest bits of the codes along the curve. */
 const CELL_BITS = 9;
 const CELLS = 1 << CELL_BITS;
-/** Splats of so many highest bits in common are a part of the scene, or belong to one. */
+/** Splats with this many highest bits in common form a block for the noise statistics. */
 const PART_BITS = 18;
-/** Words of a splat beside its geometry and its harmonics: its reach, its noise (see `choosePrecision`), its code along the curve. */
+/**
+ * Words of a splat besides its geometry and its harmonics: its reach, its noise (see `choosePrecision`), its code along
+ * the curve.
+ */
 const FACT_WORDS = 3;
 
-/** What all shares of a scene have in common. */
+/** Properties that all shards of a scene share. */
 export interface ShareLayout {
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
@@ -42,18 +46,18 @@ export interface ShareLayout {
   readonly curve: Curve | undefined;
 }
 
-/** Splats, each with all of its words in one run. Its buffers are transferable. */
+/** Splats, each with all of its words contiguous. Its buffers are transferable. */
 export interface PackedShare {
   readonly count: number;
   readonly words: Uint32Array<ArrayBuffer>;
-  /** [CELLS] the end of each cell's splats, which follow one another. Empty for a scene that keeps its order. */
+  /** [CELLS] the end index of each cell's splats, in sequence. Empty for a scene that keeps its order. */
   readonly ends: Uint32Array<ArrayBuffer>;
 }
 
 /** The splats of a cell, in the order of the file. Its buffers are transferable. */
 export interface ShareBlock {
   readonly layout: ShareLayout;
-  /** Splats before it in the scene. */
+  /** Splats in front of it in the scene. */
   readonly start: number;
   readonly count: number;
   readonly words: Uint32Array<ArrayBuffer>;
@@ -64,14 +68,14 @@ export interface SortedBlock {
   readonly start: number;
   readonly geometry: Uint32Array<ArrayBuffer>;
   readonly sh: Uint32Array<ArrayBuffer>;
-  /** Bounds of chunks: the first and the last hold splats of other blocks, too. */
+  /** Bounds of chunks: the first and the last also contain splats of other blocks. */
   readonly chunks: Float32Array<ArrayBuffer>;
 }
 
-/** Facts of a scene that its splats do not hold. */
+/** Properties of a scene that are not stored with its splats. */
 export type ShareFacts = Pick<PackedGaussians, 'antialiased' | 'filterVariance' | 'origin' | 'droppedCount'>;
 
-/** The layout of a scene by some of its splats. */
+/** Derives the layout of a scene from some of its splats. */
 export function layoutOf(cloud: GaussianCloud, shPrecision: ShPrecision): ShareLayout {
   const near = recentred(cloud);
   const moved = near.origin.map((x, axis) => x - cloud.origin[axis]) as unknown as Vector3;
@@ -81,7 +85,7 @@ export function layoutOf(cloud: GaussianCloud, shPrecision: ShPrecision): ShareL
 const wordsOf = ({ shDegree, shPrecision }: ShareLayout): number =>
   GEOMETRY_WORDS + shWords(shDegree, shPrecision) + FACT_WORDS;
 
-/** Packs at most {@link SHARE_SPLATS} splats. Those that cannot be drawn are left out. */
+/** Packs at most {@link SHARD_SPLATS} splats. Unusable ones are dropped. */
 export function packShare(given: GaussianCloud, layout: ShareLayout): PackedShare {
   const { moved, curve, shPrecision, shDegree } = layout;
   const isMoved = moved.some((x) => x !== 0);
@@ -110,7 +114,7 @@ export function packShare(given: GaussianCloud, layout: ShareLayout): PackedShar
 const cellOf = (code: number): number => code >>> (32 - CELL_BITS);
 const cellsOf = (codes: Uint32Array): Uint32Array => codes.map(cellOf);
 
-/** @param codes whose cells ascend */
+/** @param codes Codes with ascending cells. */
 function endsOf(codes: Uint32Array | undefined): Uint32Array<ArrayBuffer> {
   const ends = new Uint32Array(codes ? CELLS : 0);
   if (codes === undefined) return ends;
@@ -119,27 +123,30 @@ function endsOf(codes: Uint32Array | undefined): Uint32Array<ArrayBuffer> {
   return ends;
 }
 
-/** Moved to another origin, a splat may be too far away. */
+/** After a change of origin, a splat may be out of range. */
 function withinReach(positions: Float32Array, kept: Uint32Array): Uint32Array {
   const isNear = (x: number): boolean => Math.abs(x) <= MAX_POSITION;
   return kept.filter((i) => isNear(positions[3 * i]) && isNear(positions[3 * i + 1]) && isNear(positions[3 * i + 2]));
 }
 
-/** A cell that has its splats in pieces: the block is made when it is needed, since shares are added while a download goes on. */
+/**
+ * A cell whose splats lie in several shards: the block is assembled on demand, because shards are added during a
+ * download.
+ */
 export interface ShareCell {
   readonly start: number;
   readonly count: number;
-  /** Copies the splats together, into the memory that is given if it suffices. */
+  /** Copies the splats into one block, in the given memory if it is large enough. */
   readonly block: (room?: ArrayBuffer) => ShareBlock;
 }
 
-/** The splats of a scene by cells. */
+/** The splats of a scene, distributed to cells. */
 export class ShareCells {
   readonly #layout: ShareLayout;
   readonly #shares: PackedShare[] = [];
-  /** Splats of all shares. */
+  /** Number of splats over all shards. */
   #count = 0;
-  /** Sums of noise, and how many splats, by parts. */
+  /** Sums of noise, and numbers of splats, for each block. */
   readonly #noises = new Float64Array(1 << PART_BITS);
   readonly #counts = new Uint32Array(1 << PART_BITS);
 
@@ -147,7 +154,7 @@ export class ShareCells {
     this.#layout = layout;
   }
 
-  /** Takes the next share, in the order of the file: splats of one code keep that order. */
+  /** Adds the next shard, in the order of the file: splats with equal codes keep that order. */
   add(share: PackedShare): void {
     this.#shares.push(share);
     const stride = wordsOf(this.#layout);
@@ -161,8 +168,9 @@ export class ShareCells {
   }
 
   /**
-   * The layout that the scene needs, once all of its shares are known: their own, or another, by which they must be packed again.
-   * @param asked precision of spherical harmonics
+   * Returns the layout that the scene requires, once all of its shards are known: their own, or another, with which
+   * they must be packed again.
+   * @param asked Requested precision of spherical harmonics.
    */
   layoutFor(asked: PackOptions['sh'] = 'auto'): ShareLayout {
     const layout = this.#layout;
@@ -171,7 +179,7 @@ export class ShareCells {
     return layout.curve && isOfPlanes(this.#somePositions()) ? { ...layout, curve: undefined } : layout;
   }
 
-  /** As `choosePrecision` does, by parts of {@link PART} splats or a few more. */
+  /** Same as `choosePrecision`, in blocks of at least {@link PART} splats. */
   #precision(): ShPrecision {
     let [sum, worst, noise, count] = [0, 0, 0, 0];
     this.#noises.forEach((more, part) => {
@@ -196,7 +204,7 @@ export class ShareCells {
     return Float32Array.from(positions);
   }
 
-  /** Cells that hold something, in the order of the scene. */
+  /** Non-empty cells, in the order of the scene. */
   all(): ShareCell[] {
     const cells: ShareCell[] = [];
     let start = 0;
@@ -232,14 +240,14 @@ export class ShareCells {
   }
 }
 
-/** Splats of a share. */
+/** Splats of a shard. */
 interface Range {
   readonly share: PackedShare;
   readonly first: number;
   readonly end: number;
 }
 
-/** Puts the splats of a block in the order of their codes, and bounds its chunks. */
+/** Sorts the splats of a block by their codes, and computes the bounds of its chunks. */
 export function sortBlock({ layout, start, count, words }: ShareBlock): SortedBlock {
   const [stride, shStride] = [wordsOf(layout), shWords(layout.shDegree, layout.shPrecision)];
   const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
@@ -263,7 +271,7 @@ export function sortBlock({ layout, start, count, words }: ShareBlock): SortedBl
   return { start, geometry, sh, chunks };
 }
 
-/** Numbers of splats in the order of their codes, which are their last words. */
+/** Indices of splats in the order of their codes, which are their last words. */
 function orderOf(words: Uint32Array, stride: number, count: number): Uint32Array {
   const codes = new Uint32Array(count);
   for (let k = 0; k < count; k++) codes[k] = words[stride * (k + 1) - 1];
@@ -283,7 +291,7 @@ function emptyChunks(count: number): Float32Array<ArrayBuffer> {
   return chunks;
 }
 
-/** Takes another splat into a chunk: see `boundChunks`. */
+/** Extends the bounds of a chunk by a splat: see `boundChunks`. */
 function grow(chunks: Float32Array, at: number, floats: Float32Array, from: number, reach: number): void {
   for (let axis = 0; axis < 3; axis++) {
     const x = floats[from + axis];
@@ -293,7 +301,7 @@ function grow(chunks: Float32Array, at: number, floats: Float32Array, from: numb
   if (reach > chunks[at + 3]) chunks[at + 3] = reach;
 }
 
-/** A scene of which blocks come in any order. */
+/** A scene whose blocks arrive in any order. */
 export class JoinedBlocks {
   /** What is known of the scene before its blocks come. */
   readonly head: PackedHead;
@@ -340,12 +348,12 @@ export class JoinedBlocks {
     this.#sh.set(sh, shWords(this.head.shDegree, this.head.shPrecision) * start);
   }
 
-  /** The scene, to the byte what `packGaussians` makes of it if the layout is that of the whole scene. */
+  /** Returns the scene, byte for byte the result of `packGaussians` if the layout is that of the whole scene. */
   get packed(): PackedGaussians {
     return { ...this.head, geometry: this.#geometry, sh: this.#sh, chunks: this.chunks };
   }
 
-  /** Bounds of the scene: its box to the bit, the rest from a sample of its splats. */
+  /** Bounds of a scene: its box exactly, the rest from a sample of its splats. */
   get bounds(): Bounds {
     const { origin } = this.head;
     const edge = (first: number, farther: (a: number, b: number) => number): Vector3 => {

@@ -3,12 +3,12 @@ import { type PackedGaussians } from './pack.js';
 import { BAND_SIZES, FIRST_CODE_BYTE, SCALE_BIAS, SCALE_BYTES, SCALE_STEPS } from './sh.js';
 import { GEOMETRY_WORDS, shWords } from './words.js';
 
-/** Reads back what pack.ts and sh.ts wrote, as precisely as it was kept. */
+/** Decodes the output of pack.ts and sh.ts with the stored precision. */
 
 const bits = new Uint32Array(1);
 const float = new Float32Array(bits.buffer);
 
-/** The number whose highest bits are these. */
+/** The number with these highest bits. */
 function fromBits(word: number): number {
   bits[0] = word;
   return float[0];
@@ -17,9 +17,7 @@ function fromBits(word: number): number {
 /** Upper 22 bits of a float32. */
 const HIGH_22 = 0xfffffc00;
 
-/**
- * Position, factor (xx, yx, yy, zx, zy, zz) and opacity of splat `i`, to places `i` of three arrays.
- */
+/** Writes position, factor (xx, yx, yy, zx, zy, zz) and opacity of splat `i` to element `i` of three arrays. */
 export function unpackSplat(
   geometry: Uint32Array,
   i: number,
@@ -45,7 +43,7 @@ export function unpackSplat(
 
 let halves: Float32Array | undefined;
 
-/** All float16, by their bits. */
+/** All float16 values, by their bits. */
 function halfTable(): Float32Array {
   if (halves !== undefined) return halves;
   halves = new Float32Array(1 << 16);
@@ -96,7 +94,7 @@ function int8Reader(words: Uint32Array, degree: ShDegree): ShReader {
         const scaleCode = codes[from + SCALE_BYTES[band]] & 0xff;
         const step = scaleCode === 0 ? 0 : 2 ** (scaleCode / SCALE_STEPS - SCALE_BIAS) / 127;
         for (let n = 0; n < 3 * BAND_SIZES[band]; n++, code++) {
-          // The last code of degree 1 has no room behind the others: see packSh.
+          // The last code of degree 1 does not fit behind the others: see packSh.
           out[to++] = step * codes[code < from + stride ? code : from + SCALE_BYTES[1]];
         }
       }

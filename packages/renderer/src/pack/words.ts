@@ -1,4 +1,4 @@
-/** Sizes of packed scenes. They stand apart from the code that packs, which few pages need on their own thread. */
+/** Sizes of packed scenes. Separate from the packing code, which few pages need on the main thread. */
 import { shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
 import { layouts } from '../generated/shaders.js';
 
@@ -8,10 +8,10 @@ export const GEOMETRY_WORDS = layouts.PackedGaussian.size / 4;
 /** Numbers of one chunk. */
 export const CHUNK_NUMBERS = layouts.Chunk.size / 4;
 
-/** How spherical harmonics are stored: see `packSh`. */
+/** Storage of spherical harmonics: see `packSh`. */
 export type ShPrecision = 'int8' | 'float16';
 
-/** The number by which `View.sh_encoding` tells them apart. */
+/** Values of `View.sh_encoding`. */
 export const SH_PRECISION: Record<ShPrecision, number> = { int8: 0, float16: 1 };
 
 /** 32-bit words of one splat's spherical harmonics: 2, 4, 8, 14 as `int8`, 2, 6, 14, 24 as `float16` for degree 0 to 3. */

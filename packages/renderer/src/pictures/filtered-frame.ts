@@ -5,27 +5,27 @@ import { writeStruct } from '../gpu/struct.js';
 import { FullScreenStage } from '../stages/full-screen.js';
 import { ImageTensor, type ImageShape } from './picture-tensor.js';
 
-/** An image of a model on the GPU. */
+/** An output image of a model on the GPU. */
 export interface ModelImage {
   readonly buffer: GPUBuffer;
   readonly dtype: 'float32' | 'float16';
-  /** [1, 3, height, width]; a batch of one may be missing, and a fourth plane is not read. */
+  /** [1, 3, height, width]; the batch dimension may be missing, and a fourth plane is ignored. */
   readonly dims: readonly number[];
 }
 
 const [FORMAT, PIXEL_BYTES] = ['rgba16float', 8] as const;
-/** Buffers of models whose bindings are kept. */
+/** Buffers of models with cached bindings. */
 const MAX_BINDINGS = 8;
 
 /**
- * Textures of one frame that a model makes another of, all of one size: the frame as it is drawn, the frame that was handed to the model,
- * and what the model made of that.
+ * Textures of one frame that a model processes, all of one size: the drawn frame, the input frame of the model, and the
+ * model's output.
  *
  * ```ts
  * const frame = new FilteredFrame(device, width, height);
  * viewpoint.draw(camera, { target: frame.drawn });
  * const tensor = frame.handOver({ width: 256, height: 256, dtype: 'float32' }); // to the model
- * frame.accept(picture); // from the model
+ * frame.accept(image); // from the model
  * frame.present('filtered', canvasTexture);
  * ```
  */
@@ -63,14 +63,14 @@ export class FilteredFrame {
     };
   }
 
-  /** Bytes of GPU memory held. */
+  /** Bytes of allocated GPU memory. */
   get byteLength(): number {
     return 3 * PIXEL_BYTES * this.width * this.height + this.#uniform.size + (this.#tensor?.byteLength ?? 0);
   }
 
   /**
-   * Copies the drawn frame into a tensor for the model. The tensor, and the frame whose alpha the model's image gets, stay as they are until
-   * the next call.
+   * Copies the drawn frame into a tensor for the model. The tensor, and the frame that supplies the alpha of the
+   * result, stay unchanged until the next call.
    */
   handOver(shape: ImageShape): ImageTensor {
     const { width, height, dtype, channels } = this.#tensor?.shape ?? {};
@@ -87,7 +87,7 @@ export class FilteredFrame {
     return this.#tensor!;
   }
 
-  /** Takes over what the model made of the frame handed over last; submits its work before it returns. */
+  /** Accepts the model's output for the last input frame; submits its work before it returns. */
   accept({ buffer, dtype, dims }: ModelImage): void {
     const bytes = new ArrayBuffer(layouts.TensorToImage.size);
     writeStruct(
@@ -101,7 +101,7 @@ export class FilteredFrame {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Puts one of the images into a texture of the same size. */
+  /** Copies one of the images into a texture of the same size. */
   present(picture: 'drawn' | 'filtered', target: GPUTexture): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.present' });
     this.#present.record(encoder, this.#shown[picture], target.createView(), target.format);

@@ -13,39 +13,40 @@ export interface ImageShape {
   readonly dtype: 'float32' | 'float16';
   /** 4 with alpha. Default 3. */
   readonly channels?: 3 | 4;
-  /** Images, one after the other. Default 1. */
+  /** Number of images in the tensor. Default 1. */
   readonly views?: number;
 }
 
 /**
- * How an image of another size gets into the tensor: `stretch` takes all of it, `cover` as much of its middle as has the tensor's
- * proportions.
+ * Fit of an image of another size: `stretch` uses all of it, `cover` the largest central region with the proportions of
+ * the tensor.
  */
 export type ImageFit = 'stretch' | 'cover';
 
 /**
- * An image, or several, as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1 as they are encoded (sRGB), top row first, over
- * black where the image is transparent. Images of another size are resampled: bilinear, antialiased where they shrink.
+ * An image, or several, as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1, sRGB-encoded,
+ * top row first, over black if the image is transparent. Images of another size are resampled: bilinear, antialiased
+ * when they shrink.
  */
 export class ImageTensor {
   readonly shape: ImageShape;
   /** [views, channels, height, width] */
   readonly dims: readonly [number, 3 | 4, number, number];
-  /** The elements; float16 two to a word. */
+  /** The elements; two float16 in each word. */
   readonly buffer: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #kernel: ComputeKernel<typeof imageToTensor>;
   readonly #memory: GpuMemory;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.ImageToTensor.size);
-  /** Of one picture. */
+  /** Words of one image. */
   readonly #words: number;
   readonly #bindings = new WeakMap<GPUTexture, GPUBindGroup>();
   #version = 0;
 
   /**
-   * @throws GaussianSplatError `out-of-memory/buffer-limit` for a size that the device does not allow; `argument/value` for several pictures of
-   * float16 with an odd number of elements.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` for a size that the device does not allow; `argument/value`
+   * for several float16 images with an odd number of elements.
    */
   constructor(device: GPUDevice, shape: ImageShape) {
     const { width, height, dtype, channels = 3, views = 1 } = shape;
@@ -57,7 +58,7 @@ export class ImageTensor {
     this.#kernel = kernelOf(device, imageToTensor);
     this.#memory = new GpuMemory(device);
     const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
-    // Whole pieces of 16 bytes: ONNX Runtime copies no smaller ones.
+    // A multiple of 16 bytes, because ONNX Runtime copies no smaller units.
     const size = Math.ceil((4 * views * this.#words) / 16) * 16;
     this.buffer = this.#memory.buffer('gs.picture.tensor', size, storage | copySource | copyDestination);
     const usage = uniform | copyDestination;
@@ -68,20 +69,20 @@ export class ImageTensor {
     return this.shape.dtype;
   }
 
-  /** Bytes of GPU memory held. */
+  /** Bytes of allocated GPU memory. */
   get byteLength(): number {
     return this.#memory.byteLength;
   }
 
-  /** Number of images taken in until now. */
+  /** Number of images written until now. */
   get version(): number {
     return this.#version;
   }
 
   /**
-   * Takes an image over from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is read back.
-   * Textures with alpha hold premultiplied colours.
-   * @param view which of several images it is, from 0
+   * Writes an image from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is
+   * read back. Textures with alpha hold premultiplied colors.
+   * @param view Index of the image in the tensor, from 0.
    */
   write(texture: GPUTexture, fit: ImageFit = 'stretch', view = 0): void {
     this.#writeUniform(texture.width, texture.height, fit, view);
@@ -99,8 +100,8 @@ export class ImageTensor {
   }
 
   /**
-   * Takes over what a browser can draw (an ImageBitmap, an image, a canvas, a frame of a video), without reading it back.
-   * @throws GaussianSplatError `argument/value` for an image without pixels, or larger than the device's textures.
+   * Writes an image source of the browser (an ImageBitmap, an image, a canvas, a video frame), without a read-back.
+   * @throws GaussianSplatError `argument/value` for an image without pixels, or larger than the textures of the device.
    */
   upload(source: GPUCopyExternalImageSource, fit: ImageFit = 'cover', view = 0): void {
     const { width, height } = sizeOf(source);
@@ -115,7 +116,7 @@ export class ImageTensor {
     });
     this.#device.queue.copyExternalImageToTexture({ source }, { texture, premultipliedAlpha: true }, [width, height]);
     this.write(texture, fit, view);
-    // What has been submitted still finds it.
+    // Submitted commands keep the texture alive.
     texture.destroy();
   }
 
@@ -137,7 +138,7 @@ export class ImageTensor {
   }
 }
 
-/** Pixels of a picture; 0 by 0 of one that has not loaded. */
+/** Size of an image in pixels; 0 by 0 if it has not loaded. */
 function sizeOf(source: GPUCopyExternalImageSource): { width: number; height: number } {
   if ('displayWidth' in source) return { width: source.displayWidth, height: source.displayHeight };
   if ('videoWidth' in source) return { width: source.videoWidth, height: source.videoHeight };

@@ -1,4 +1,4 @@
-/** Painting tiles with auxiliary outputs. */
+/** Rasterizes tiles with auxiliary outputs. */
 import { rasterizeTilesAuxiliary } from '../generated/auxiliary-shaders.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
@@ -11,7 +11,9 @@ import type {
 import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
 import { BoundImages } from './tile-painter.js';
 
-/** Auxiliary outputs of a frame: see {@link AuxiliaryTargets}. Few pages ask for any, so the code comes with this class. */
+/**
+ * Auxiliary outputs of a frame: see {@link AuxiliaryTargets}. Few pages use any, so the code is loaded with this class.
+ */
 export class AuxiliaryOutputs implements AuxiliaryOutputsOf {
   readonly #targets: AuxiliaryTargets;
 
@@ -24,7 +26,7 @@ export class AuxiliaryOutputs implements AuxiliaryOutputsOf {
   }
 }
 
-/** Writes auxiliary outputs besides. */
+/** Also writes auxiliary outputs. */
 class AuxiliaryPainter implements AuxiliaryTilePainter {
   readonly tile = constants.TILE;
   readonly #device: GPUDevice;
@@ -32,14 +34,14 @@ class AuxiliaryPainter implements AuxiliaryTilePainter {
   readonly #survivors: GPUBuffer;
   #frame: AuxiliaryFrame | undefined;
 
-  /** @param survivors numbers of the visible splats by slot */
+  /** @param survivors Indices of the visible splats by slot. */
   constructor(device: GPUDevice, outputs: AuxiliaryTargets, survivors: GPUBuffer) {
     this.#device = device;
     this.#outputs = outputs;
     this.#survivors = survivors;
   }
 
-  /** What the frame was painted from; undefined before it is recorded. */
+  /** Inputs of the frame's rasterization; undefined before it is recorded. */
   get frame(): AuxiliaryFrame | undefined {
     return this.#frame;
   }
@@ -48,7 +50,7 @@ class AuxiliaryPainter implements AuxiliaryTilePainter {
     return rasterizeKernel(this.#device, rasterizeTilesAuxiliary, variant);
   }
 
-  /** Bound anew for each frame: few frames have auxiliary outputs. */
+  /** Bound again for each frame, because few frames have auxiliary outputs. */
   bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup {
     const unused = unusedOutputs(this.#device);
     const { contributions = unused.contributions, depth = unused.depth } = this.#outputs;
@@ -60,7 +62,7 @@ class AuxiliaryPainter implements AuxiliaryTilePainter {
   }
 }
 
-/** Where auxiliary outputs go that no caller asked for. */
+/** Placeholders for auxiliary outputs that the caller did not request. */
 const unusedOutputs = (device: GPUDevice): Required<AuxiliaryTargets> =>
   perDevice(device, 'unused outputs', () => ({
     contributions: device.createBuffer({ label: 'gs.no_contributions', size: 4, usage: BUFFER_USAGE.storage }),

@@ -1,4 +1,4 @@
-/** What the rasterizer `tiles` keeps of pairs of splat and bin. */
+/** Buffers of the rasterizer `tiles` for pairs of splat and bin. */
 import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
@@ -11,13 +11,13 @@ const WORD_BYTES = 4;
 
 /** Buffers whose size follows the scene. */
 export interface PairBuffers {
-  /** Until pairs are sorted, the second of {@link bins}: it is first written then. */
+  /** Shares memory with the second of {@link bins}, which is first written when pairs are sorted. */
   readonly rects: GPUBuffer;
   readonly groupPairs: GPUBuffer;
   readonly plan: GPUBuffer;
-  /** The second is a spare one of {@link RasterizerInputs}. */
+  /** The second is a ping-pong buffer of {@link RasterizerInputs}. */
   readonly bins: readonly [GPUBuffer, GPUBuffer];
-  /** The first is the other spare one. */
+  /** The first is the other ping-pong buffer. */
   readonly pairs: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
@@ -26,7 +26,7 @@ export interface PairBuffers {
 /** `bin_index` writes its bits in whole groups. */
 const wholeGroups = (pairs: number): number => PROJECT_GROUP * Math.ceil(pairs / PROJECT_GROUP);
 
-/** Bytes of either spare buffer. */
+/** Bytes of either ping-pong buffer. */
 export const spareBytesOf = ({ capacity, pairCapacity }: Room): number =>
   WORD_BYTES * Math.max(wholeGroups(pairCapacity), capacity);
 
@@ -49,7 +49,7 @@ export function pairBuffers(
   };
 }
 
-/** Most pairs for which the device's buffers can have room: whole groups. */
+/** Maximum number of pairs that the device's buffers can hold: whole groups. */
 export function maxPairs(device: GPUDevice): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   const bytes = Math.min(maxBufferSize, maxStorageBufferBindingSize);

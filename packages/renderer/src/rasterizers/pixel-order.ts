@@ -1,4 +1,4 @@
-/** An order of each pixel's own, for the rasterizer `tiles`: loaded with the first frame that asks for it. */
+/** Per-pixel order for the rasterizer `tiles`, loaded with the first frame that requests it. */
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings } from '../bindings.js';
 import { pixelDepths, pixelDepthsQuantized, rasterizeTilesOrder } from '../generated/order-shaders.js';
@@ -22,7 +22,7 @@ type DepthResources = PaintingDepth['resources'];
 /** See shaders/pixel_depths.wgsl and shaders/rasterize_tiles_order.wgsl. */
 export class PixelOrder {
   readonly #device: GPUDevice;
-  /** Of the pages that a frame shows. */
+  /** Bindings for the blocks of a frame. */
   readonly #pages = new WeakMap<FrameBindings, readonly Recorded[]>();
   readonly #bound = new BoundImages();
 
@@ -30,7 +30,10 @@ export class PixelOrder {
     this.#device = device;
   }
 
-  /** Finds how the depth of each visible splat differs from pixel to pixel, and other keys for the sort. To be recorded behind `project`. */
+  /**
+   * Computes how the depth of each visible splat changes from pixel to pixel, and replaces the sort keys. Record it
+   * after `project`.
+   */
   recordDepths(pass: GPUComputePassEncoder, bindings: FrameBindings): void {
     let pages = this.#pages.get(bindings);
     if (pages === undefined) this.#pages.set(bindings, (pages = this.#bindPages(bindings)));
@@ -38,8 +41,8 @@ export class PixelOrder {
   }
 
   /**
-   * @param scratch of the frame; undefined where only pipelines are wanted
-   * @param depth what the frame has to do with other depths
+   * @param scratch Buffers of the frame; undefined to compile pipelines only.
+   * @param depth Depth of meshes in the frame.
    */
   painter(
     { orderWindow }: Pick<RenderSettings, 'orderWindow'>,
@@ -89,7 +92,7 @@ interface Recorded {
   readonly groups: number;
 }
 
-/** What is bound where there is no depth; none of it is looked at. */
+/** Placeholder bindings for frames without depth, which are not read. */
 const noDepth = (device: GPUDevice): DepthResources =>
   perDevice(device, 'order without depth', () => {
     const texture = (usage: number): GPUTextureView =>

@@ -17,7 +17,7 @@ const INDICES_PER_QUAD = 6;
 
 type Program = ShaderProgram<typeof rasterizeQuads>;
 
-/** Hardware quads, back to front, blended into a float texture. */
+/** Rasterizes quads with the hardware, back to front, blended into a float texture. */
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
   readonly #device: GPUDevice;
@@ -46,12 +46,12 @@ export class QuadsRasterizer implements Rasterizer {
     });
   }
 
-  /** Next to nothing: quads need no memory of their own. */
+  /** Negligible, because quads need no memory of their own. */
   get byteLength(): number {
     return this.#uniform.size;
   }
 
-  /** Blending needs a texture that it can read back. */
+  /** False, because blending needs an accumulation texture. */
   finishes(): boolean {
     return false;
   }
@@ -71,20 +71,20 @@ export class QuadsRasterizer implements Rasterizer {
     this.#pipeline();
   }
 
-  /** Quads are drawn from what the stages before have left. */
+  /** Does nothing: quads are drawn from the output of the earlier stages. */
   prepareFrame(): void {}
 
   record(encoder: GPUCommandEncoder, { surface, timer, depth, depths }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     const layers = depth?.layers ?? 0;
-    // With layers a frame is not divided: a part of the splats lies on both sides of them.
+    // A frame with layers is not divided, because each slice of the splats lies on both sides of them.
     if (layers > 0 && slice.index > 0) return;
     const [index, slices] = layers > 0 ? [0, 1] : [slice.index, slice.count];
     writeStruct(layouts.RasterView, { viewport: [width, height], slice: index, slices }, this.#uniformBytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
     const pass = encoder.beginRenderPass({
       label: 'gs.rasterize',
-      // Nothing painted yet: black, and all light still to come from behind.
+      // Clears to black with full transmittance.
       colorAttachments: [
         {
           view,
@@ -99,14 +99,14 @@ export class QuadsRasterizer implements Rasterizer {
       const { plan, splats, order, capacity } = this.#inputs;
       const deep = depth?.quadsProgram;
       const resources = { raster: this.#uniform, plan, splats, order };
-      // The image may be a part of the texture.
+      // The image may cover only a part of the texture.
       pass.setViewport(0, 0, width, height, 0, 1);
       pass.setIndexBuffer(this.#indices, 'uint16');
-      // Layers of what else is in the picture lie between the splats behind and before them.
+      // Layers of meshes are blended between the splats behind and in front of them.
       for (let part = layers; part >= 0; part--) {
         pass.setPipeline(this.#pipeline(deep, { layers, part }));
         pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
-        // As many as there is room for: the vertices of those that are not there lie outside.
+        // Draws the full capacity: the vertices of missing splats are clipped.
         pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));
         if (part === 0) break;
         pass.setPipeline(this.#layerPipeline(depth!, { layers, nth: part - 1 }));

@@ -4,32 +4,35 @@ import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.
 import type { RenderSettings } from '../render-settings.js';
 import type { TilePainter } from './tile-painter.js';
 
-/** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
+/** `quads`: hardware rasterization and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
 
 /** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
 
-/** What every rasterizer reads. */
+/** Inputs of every rasterizer. */
 export interface RasterizerInputs {
-  /** `Plan`: how many splats there are to draw. */
+  /** `Plan`: number of splats to draw. */
   readonly plan: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
   readonly order: GPUBuffer;
-  /** Of at least {@link Rasterizer.spareBytes} each: nobody else's once splats are in order, until the next frame. */
+  /**
+   * At least {@link Rasterizer.spareBytes} each: reserved for the rasterizer from the end of the sort until the next
+   * frame.
+   */
   readonly spare: readonly [GPUBuffer, GPUBuffer];
-  /** Most splats that can be visible. */
+  /** Maximum number of visible splats. */
   readonly capacity: number;
-  /** Pairs of splat and bin for which there shall be room. */
+  /** Required capacity in pairs of splat and bin. */
   readonly pairCapacity: number;
 }
 
-/** For how much there shall be room. */
+/** Required capacities. */
 export type Room = Pick<RasterizerInputs, 'capacity' | 'pairCapacity'>;
 
-/** Where a rasterizer draws. */
+/** Destination of a rasterizer. */
 export interface Surface {
   readonly view: GPUTextureView;
   readonly format: GPUTextureFormat;
@@ -38,33 +41,37 @@ export interface Surface {
   readonly height: number;
 }
 
-/** What a frame tells about itself on the way, besides its image. */
+/** Auxiliary outputs of a frame, besides its image. */
 export interface AuxiliaryTargets {
   /**
-   * One word for each splat, in the order of `packedOrder`, pages filled up to whole chunks of 256: the bits of the largest weight, alpha times
-   * transmittance, that the splat has had in any pixel. Weights of earlier frames stay where they are larger: clear the buffer for those
-   * of one frame. Usage: storage.
+   * One word for each splat, in the order of `packedOrder`, with blocks padded to whole chunks of 256: the bits of the
+   * largest weight, alpha times transmittance, of the splat in any pixel. Larger weights of earlier frames are kept:
+   * clear the buffer for those of a single frame. Usage: storage.
    */
   readonly contributions?: GPUBuffer;
   /**
-   * Receives the camera depth of each pixel, in world units to 11 bits: that of the splat that leaves it half transparent or less, 0 where none does.
-   * A texture of the target's size, format `r32float`, usage STORAGE_BINDING.
+   * Receives the camera depth of each pixel, in world units to 11 bits: that of the splat that reduces its
+   * transmittance to half or less, 0 if none does. A texture of the target's size, format `r32float`, usage
+   * STORAGE_BINDING.
    */
   readonly depth?: GPUTexture;
 }
 
-/** What writes auxiliary outputs: the class of this name in `@gaussian-splat/renderer/tools`. */
+/** Writes auxiliary outputs: implemented by the class of this name in `@gaussian-splat/renderer/tools`. */
 export interface AuxiliaryOutputs {
-  /** @param survivors numbers of the visible splats by slot */
+  /** @param survivors Indices of the visible splats by slot. */
   painter(device: GPUDevice, survivors: GPUBuffer): AuxiliaryTilePainter;
 }
 
 export interface AuxiliaryTilePainter extends TilePainter {
-  /** What the frame was painted from; undefined before it is recorded. */
+  /** Inputs of the frame's rasterization; undefined before it is recorded. */
   readonly frame: AuxiliaryFrame | undefined;
 }
 
-/** What a frame with auxiliary outputs was painted from, for passes that go over it again. All of it is the renderer's: to be read before the next frame. */
+/**
+ * Rasterization inputs of a frame with auxiliary outputs, for passes that process it again. The renderer owns them:
+ * read them before the next frame.
+ */
 export interface AuxiliaryFrame {
   /** `BinView` of shaders/shared/bins.wgsl. */
   readonly view: GPUBuffer;
@@ -72,40 +79,43 @@ export interface AuxiliaryFrame {
   readonly splats: GPUBuffer;
   /** array<u32>: slots, bin by bin and in depth order. */
   readonly pairs: GPUBuffer;
-  /** Which pairs touch which tile: `tile_word` of shaders/shared/bins.wgsl. */
+  /** Bits of the pairs that touch each tile: `tile_word` of shaders/shared/bins.wgsl. */
   readonly tile_bits: GPUBuffer;
-  /** array<vec2u>: of each bin the first pair, and the one behind the last. */
+  /** array<vec2u>: for each bin the first pair, and the one after the last. */
   readonly ranges: GPUBuffer;
-  /** Numbers of the splats by slot, as {@link AuxiliaryTargets.contributions} counts them. */
+  /** Indices of the splats by slot, as in {@link AuxiliaryTargets.contributions}. */
   readonly survivors: GPUBuffer;
 }
 
-/** Textures of what else is in a frame. */
+/** Textures of the meshes in a frame. */
 export type DepthTexture = 'stored_depth' | 'median_depth' | 'layer_color' | 'second_depth' | 'second_color';
 
-/** What a frame has to do with depth besides its own. `SceneDepth` is one; pictures bring it, so that pages without it load none of its code. */
+/**
+ * Depth of a frame besides its own: `SceneDepth` implements it. Frames provide it, so that pages without it load none
+ * of its code.
+ */
 export interface PaintingDepth {
-  /** Called before a frame is recorded, with the pixels that are drawn. @throws GaussianSplatError for a frame that it does not fit */
+  /** Called before a frame is recorded, with its resolution. @throws GaussianSplatError if it does not fit the frame. */
   prepare(
     camera: Camera,
     drawn: { readonly width: number; readonly height: number },
     rasterizer: RasterizerName,
     auxiliary: AuxiliaryOutputs | undefined,
   ): void;
-  /** @param depths camera depths of the splats by slot */
+  /** @param depths Camera depths of the splats by slot. */
   painter(depths: GPUBuffer): TilePainter;
   readonly quadsProgram: QuadsWithDepth;
-  /** Layers of color among the splats; 0 where the depth just ends pixels. */
+  /** Layers of color among the splats; 0 if the depth only ends pixels. */
   readonly layers: number;
-  /** For quads: what blends a layer over the splats behind it. */
+  /** For quads: blends a layer over the splats behind it. */
   readonly layerProgram: Pick<ShaderProgram<ShaderDescription>, 'module' | 'pipelineLayout'>;
   readonly layerBindings: GPUBindGroup;
-  /** What a shader that has depth among other things binds, and its overrides. */
+  /** Resources and overrides of a shader that reads depth. */
   readonly resources: Readonly<Record<'scene', GPUBuffer> & Record<DepthTexture, GPUTextureView>>;
   readonly overrides: Overrides;
 }
 
-/** Quads that read depths: what a pipeline is made of, and what is bound to it. */
+/** Program and bindings of quads that read depths. */
 export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, 'module' | 'pipelineLayout'> {
   readonly name: string;
   bind(
@@ -115,7 +125,7 @@ export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, '
   ): GPUBindGroup;
 }
 
-/** Settings that rasterizers know. */
+/** Settings of rasterizers. */
 export type PaintingLevers = Pick<RenderSettings, 'transmittanceMin'>;
 
 /** One frame to draw. */
@@ -123,46 +133,49 @@ export interface Painting {
   readonly surface: Surface;
   readonly levers: PaintingLevers;
   /**
-   * Premultiplied colour to lay the splats over; the surface is then the final image. Without it the surface receives colour, and
-   * transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
+   * Premultiplied background color; the surface then receives the final image. Without it the surface receives color,
+   * with the transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
    */
   readonly background?: readonly [number, number, number, number];
   readonly timer?: FrameTimer | undefined;
-  /** `quads` only: what the frame has to do with depth. */
+  /** `quads` only: depth of meshes. */
   readonly depth?: PaintingDepth | undefined;
   /** Camera depths of the splats by slot; with {@link depth}. */
   readonly depths?: GPUBuffer | undefined;
-  /** `tiles` only: how tiles are painted where not plainly. */
+  /** `tiles` only: variant of the tile rasterization; default is the plain one. */
   readonly painter?: TilePainter | undefined;
 }
 
-/** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */
+/**
+ * A slice of a frame's rasterization: all `count` of them, in order, give the image. Each rasterizer defines its
+ * slices.
+ */
 export interface Slice {
   readonly index: number;
   readonly count: number;
 }
 
 /**
- * Paints projected, depth-ordered splats. Rasterizers are interchangeable: same inputs, same falloff
+ * Rasterizes projected, depth-sorted splats. Rasterizers are interchangeable: same inputs, same falloff
  * (shaders/shared/falloff.wgsl), same output.
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
-  /** Bytes of GPU memory held. */
+  /** Bytes of allocated GPU memory. */
   readonly byteLength: number;
-  /** `Plan` of the pairs of splat and bin, where there are pairs. */
+  /** `Plan` of the pairs of splat and bin, if the rasterizer uses pairs. */
   readonly pairPlan?: GPUBuffer;
-  /** True if the rasterizer can write a final image of this format by itself. */
+  /** Whether the rasterizer can write a final image of this format directly. */
   finishes(format: GPUTextureFormat): boolean;
-  /** Bytes of each buffer of {@link RasterizerInputs.spare} that it needs. */
+  /** Required bytes of each buffer of {@link RasterizerInputs.spare}. */
   spareBytes(room: Room): number;
-  /** Remembers the buffers; called again only when they are replaced. */
+  /** Binds the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
-  /** Makes the pipelines for other settings, so that no frame has to. @param format of the targets */
+  /** Compiles the pipelines for other settings, so that no frame has to. @param format Format of the targets. */
   prepare(levers: PaintingLevers, format: GPUTextureFormat, painter?: TilePainter): void;
-  /** Records what the parts of one frame have in common, before the first of them. */
+  /** Records the common work of all slices of a frame, before the first of them. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
-  /** Records the drawing of one part of one frame. Parts of a frame are submitted one by one. */
+  /** Records one slice of a frame. Slices are submitted one by one. */
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void;
   destroy(): void;
 }

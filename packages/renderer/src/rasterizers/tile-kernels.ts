@@ -9,7 +9,7 @@ import {
   type ShaderDescription,
 } from '../gpu/kernel.js';
 
-/** Those that list splats for bins: the same whatever the image. */
+/** Kernels that list splats for bins: the same for any image. */
 export interface ListingKernels {
   readonly count: ComputeKernel<typeof binCount>;
   readonly plan: ComputeKernel<typeof binPlan>;
@@ -18,7 +18,7 @@ export interface ListingKernels {
   readonly order: ComputeKernel<typeof binOrder>;
 }
 
-/** @param tile side of a tile, pixels */
+/** @param tile Side of a tile in pixels. */
 export function listingKernels(device: GPUDevice, tile: number): ListingKernels {
   const side = { tile_side: tile };
   return {
@@ -30,13 +30,13 @@ export function listingKernels(device: GPUDevice, tile: number): ListingKernels 
   };
 }
 
-/** Paints tiles. Most have more bindings than `rasterize_tiles`. */
+/** Rasterizes tiles. Most variants have more bindings than `rasterize_tiles`. */
 export type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
 
-/** What every kernel that paints tiles binds. */
+/** Common bindings of every kernel that rasterizes tiles. */
 export type PaintedTiles = Parameters<RasterizeKernel['bind']>[0] & { readonly image: GPUTextureView };
 
-/** What one pipeline is made for. */
+/** Key of one pipeline. */
 export interface RasterizeVariant {
   readonly format: GPUTextureFormat;
   readonly isFinal: boolean;
@@ -44,7 +44,7 @@ export interface RasterizeVariant {
   readonly refusesLast: boolean;
 }
 
-/** The pipeline of a shader for a variant; made once for each device. */
+/** The pipeline of a shader for a variant, created once for each device. */
 export function rasterizeKernel(
   device: GPUDevice,
   shader: ShaderDescription,

@@ -1,9 +1,9 @@
-/** The ways to paint tiles: one is chosen for each frame. */
+/** Variants of tile rasterization: one is selected for each frame. */
 import { constants, rasterizeTiles } from '../generated/shaders.js';
 import type { Resource } from '../gpu/kernel.js';
 import { rasterizeKernel, type PaintedTiles, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
 
-/** A way to paint tiles. */
+/** A variant of tile rasterization. */
 export interface TilePainter {
   /** Side of its tiles, pixels. */
   readonly tile: number;
@@ -11,11 +11,11 @@ export interface TilePainter {
   bind(kernel: RasterizeKernel, painted: PaintedTiles): GPUBindGroup;
 }
 
-/** Bind groups by the image that is painted into, made anew when something else is bound. */
+/** Bind groups by target image, created again when other resources are bound. */
 export class BoundImages {
   readonly #known = new WeakMap<GPUTextureView, { readonly key: readonly unknown[]; readonly group: GPUBindGroup }>();
 
-  /** @param more what the kernel binds besides */
+  /** @param more Additional bindings of the kernel. */
   bind(kernel: RasterizeKernel, painted: PaintedTiles, more: Readonly<Record<string, Resource>> = {}): GPUBindGroup {
     const resources = { ...painted, ...more };
     const key = [kernel, ...Object.values(resources)];
@@ -27,7 +27,7 @@ export class BoundImages {
   }
 }
 
-/** Paints splats and nothing else. */
+/** Rasterizes splats only. */
 export class PlainPainter implements TilePainter {
   readonly tile = constants.TILE;
   readonly #device: GPUDevice;

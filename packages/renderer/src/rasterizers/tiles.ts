@@ -22,19 +22,19 @@ const { BIN_COLUMNS, BIN_ROWS, PREFIX_THREADS, PROJECT_GROUP, TILES_PER_BIN } = 
 
 const groupsOf = (splats: number): number => Math.ceil(splats / PREFIX_THREADS);
 
-/** Bins across and down of an image, and the bits of a bin's number. */
+/** Bins across and down in an image, and the bits of a bin's index. */
 interface Grid {
   readonly columns: number;
   readonly rows: number;
   readonly bits: number;
 }
 
-/** What is bound for one scene, one number of bins and one size of tiles. */
+/** Bindings for one scene, one number of bins and one tile size. */
 interface GridBindings {
   readonly grid: Grid;
   readonly kernels: ListingKernels;
   readonly ranges: GPUBuffer;
-  /** The bins in the order in which they are painted. */
+  /** The bins in rasterization order. */
   readonly binOrder: GPUBuffer;
   readonly count: GPUBindGroup;
   readonly emit: GPUBindGroup;
@@ -44,23 +44,27 @@ interface GridBindings {
   readonly order: GPUBindGroup;
 }
 
-/** Formats of images that a compute shader may write without an optional feature, and the one that asks for one. */
+/** Image formats that a compute shader may write without an optional feature, and the one that requires one. */
 const STORABLE: readonly GPUTextureFormat[] = ['rgba8unorm', 'rgba16float', 'rgba32float'];
 const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
 
-/** Numbers of bins that are kept bound. */
+/** Number of grids with cached bindings. */
 const MAX_GRIDS = 12;
 
-/** At the threshold that scenes are trained with, the splat that would go below it is refused; at higher ones it is the last that is blended. */
+/**
+ * At the threshold of training, the splat that would go below it is rejected; at higher ones it is the last one that is
+ * blended.
+ */
 const refusesLast = ({ transmittanceMin }: PaintingLevers): boolean => transmittanceMin <= TRAINED_TRANSMITTANCE;
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
- * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 8 x 4 tiles: counted, written, and sorted by bin with a stable sort that keeps
- * the depth order. Tiles then walk their bin's list front to back, those of the longest lists first, and stop when all their pixels are opaque.
+ * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 8 x 4 tiles: counted, written,
+ * and sorted by bin with a stable sort that keeps the depth order. Tiles then walk their bin's list front to back,
+ * longest lists first, and stop when all their pixels are opaque.
  *
- * Pairs beyond the room for them belong to the farthest splats; they are left out.
+ * Pairs beyond the capacity belong to the farthest splats; they are dropped.
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
@@ -73,7 +77,7 @@ export class TilesRasterizer implements Rasterizer {
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
-  /** By the size of tiles and the number of bins across and down: images in motion may have fewer pixels. */
+  /** Keyed by tile size and the number of bins across and down, because images in motion may have fewer pixels. */
   readonly #bound = new Map<string, GridBindings>();
 
   constructor(device: GPUDevice, accumulation: AccumulationFormat, threads: Threads) {
@@ -127,7 +131,7 @@ export class TilesRasterizer implements Rasterizer {
     const { count, plan, emit, index, order } = bound.kernels;
     const timestampWrites = painting.timer?.timestampWrites('bin');
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites });
-    // As many as there is room for: groups beyond the splats and pairs that are there end at once.
+    // Dispatches the full capacity: groups beyond the actual splats and pairs end at once.
     const groups = groupsOf(this.#inputs.capacity);
     count.dispatch(bin, bound.count, groups);
     plan.dispatch(bin, bound.plan, 1);
@@ -142,11 +146,11 @@ export class TilesRasterizer implements Rasterizer {
     const { surface, levers, background, painter = this.#plain, timer } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
-    // Every so many-th tile: the parts of a frame have long and short lists alike.
+    // Tiles are interleaved, so that all slices of a frame have long and short lists.
     const tiles = bound.grid.columns * bound.grid.rows * TILES_PER_BIN;
     const groups = Math.ceil((tiles - slice.index) / slice.count);
     if (groups <= 0) return;
-    // A whole frame has the view that its splats were listed with.
+    // An undivided frame uses the view that its splats were listed with.
     if (slice.count > 1) this.#writeView(painting, bound.grid, slice);
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
@@ -165,7 +169,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #release(): void {
-    // The spare ones are not of this memory, and stay.
+    // The ping-pong buffers belong to other memory, and stay.
     for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
     this.#forgetGrids();
     this.#buffers = undefined;
@@ -237,7 +241,7 @@ export class TilesRasterizer implements Rasterizer {
       splats,
       pairs: pairs[sorted],
       ...{ ranges: bound.ranges, bin_order: bound.binOrder },
-      // Once the pairs are sorted, what they were sorted from is free.
+      // The unsorted input is free once the pairs are sorted.
       tile_bits: bins[1 - sorted]!,
       image,
     };

@@ -4,10 +4,13 @@ import { ComputeKernel, perDevice, SHADER_STAGE, ShaderProgram, storingInto, typ
 import type { Surface } from '../rasterizers/rasterizer.js';
 
 const { COMPOSE_SIDE } = constants;
-/** Premultiplied colour over what is there. */
+/** Blends premultiplied color over the target. */
 const OVER: GPUBlendComponent = { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' };
 
-/** What is composed, bound for drawing; for storing it is bound to each view of a target when that is first met. */
+/**
+ * Resources of the composition, bound for drawing; for storing they are bound to each view of a target at its first
+ * use.
+ */
 export interface ComposeBindings {
   readonly resources: Resources<typeof compose>;
   readonly drawn: GPUBindGroup;
@@ -15,8 +18,9 @@ export interface ComposeBindings {
 }
 
 /**
- * Lays the accumulated splats over the background: `draw` into a view of any renderable colour format, `store` into one that a compute shader may write. The picture
- * is the same to the rounding of its format. A GPU with few units that draw (an H200 has them in a small part of it) takes longer for one triangle than for all tiles.
+ * Composes the accumulated splats over the background: `draw` into a view of any renderable color format, `store` into
+ * one that a compute shader may write. The image is the same up to the rounding of its format. A GPU with few raster
+ * units (an H200 has them only in a small part) takes longer for one triangle than for all tiles.
  */
 export class ComposeStage {
   readonly #device: GPUDevice;
@@ -35,13 +39,13 @@ export class ComposeStage {
     return { resources, drawn: this.#program.bind(resources), stored: new WeakMap() };
   }
 
-  /** Makes the pipeline for targets of a format, so that no frame has to. */
+  /** Compiles the pipeline for targets of a format, so that no frame has to. */
   prepare(format: GPUTextureFormat, isStored: boolean): void {
     if (isStored) this.#kernel(format).prepare();
     else this.#pipeline(format);
   }
 
-  /** @param keeps lays the splats over what the target holds, in place of a background */
+  /** @param keeps Composes over the content of the target instead of a background. */
   draw(
     encoder: GPUCommandEncoder,
     bindings: ComposeBindings,

@@ -2,11 +2,11 @@ import { detailAllow, detailCount } from '../generated/budget-shaders.js';
 import { constants } from '../generated/shaders.js';
 import { Stage } from './stage.js';
 
-/** How far chunks may be off on screen so that a frame looks at no more splats than it may. */
+/** Finds the error threshold on screen that keeps a frame within its splat budget. */
 export interface DetailBudget {
-  /** Counts a page; `detail_counts` must be 0 before the first. */
+  /** Counts one block; `lod_counts` must be 0 before the first. */
   readonly count: Stage<typeof detailCount>;
-  /** Follows the last page. */
+  /** Runs after the last block. */
   readonly allow: Stage<typeof detailAllow>;
 }
 

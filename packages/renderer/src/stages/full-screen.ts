@@ -1,6 +1,6 @@
 import { perDevice, SHADER_STAGE, ShaderProgram, type Resources, type ShaderDescription } from '../gpu/kernel.js';
 
-/** A shader that paints every pixel of a target once: entry points `vertex` and `fragment`. */
+/** A shader that draws every pixel of a target once: entry points `vertex` and `fragment`. */
 export class FullScreenStage<S extends ShaderDescription> {
   readonly #device: GPUDevice;
   readonly #name: string;

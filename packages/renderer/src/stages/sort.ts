@@ -12,13 +12,16 @@ import { BUFFER_USAGE, kernelOf, perDevice, type ComputeKernel } from '../gpu/ke
 import { writeStruct } from '../gpu/struct.js';
 import type { Threads } from './stage.js';
 
-/** The buffers that {@link SortStage} works on. */
+/** Buffers of {@link SortStage}. */
 export interface SortBuffers {
-  /** `Plan`: how many keys there are. */
+  /** `Plan`: the number of keys. */
   readonly plan: GPUBuffer;
-  /** The keys lie in the first. Passes go back and forth between the two: see {@link sortedIn}. */
+  /** The input keys are in the first. Passes alternate between the two: see {@link sortedIn}. */
   readonly keys: readonly [GPUBuffer, GPUBuffer];
-  /** What moves along with the keys: given words likewise. Indices are made by the first pass, and end in the first buffer. */
+  /**
+   * Values that move with the keys. Given words start in the first buffer, too. Indices are written by the first pass,
+   * and end in the first buffer.
+   */
   readonly values: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
@@ -35,13 +38,16 @@ const { DIGITS, DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP } = constants;
 const MAX_KEY_BITS = 32;
 const DIGIT_BITS = Math.log2(DIGITS);
 
-/** Passes that keys of so many bits take. */
+/** Number of passes for keys of this many bits. */
 const passCount = (keyBits: number): number => Math.max(1, Math.ceil(keyBits / DIGIT_BITS));
 
-/** What moves along with a key: its index, or a word of the caller's. */
+/** Value of a key: its index, or a word of the caller. */
 export type SortValues = 'indices' | 'given';
 
-/** Which of the two buffers of keys, and of given words, holds the result for keys of so many bits: the first (0) or the second (1). */
+/**
+ * Index of the buffer, of keys and of given words, that holds the result for keys of this many bits: the first (0) or
+ * the second (1).
+ */
 export const sortedIn = (keyBits: number): 0 | 1 => (passCount(keyBits) % 2 === 0 ? 0 : 1);
 
 /**
@@ -66,7 +72,7 @@ export class SortStage {
     this.#passUniforms = perDevice(device, `sort passes ${moving}`, () => makePassUniforms(device, moving));
   }
 
-  /** @param keyBits how many of the lowest bits of a key count; the others must be 0 or are ignored. */
+  /** @param keyBits Number of low bits of a key to sort by; the others must be 0 or are ignored. */
   bind({ plan, keys, values, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
     const passes = passCount(keyBits);
     return this.#passUniforms.slice(0, passes).map((uniform, index) => {
@@ -89,7 +95,7 @@ export class SortStage {
     });
   }
 
-  /** @param most keys that there may be: blocks beyond those that are end at once */
+  /** @param most Maximum number of keys: blocks beyond the actual number end at once. */
   record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], most: number): void {
     const blocks = Math.ceil(most / constants.SORT_BLOCK);
     for (const { count, scan, scatter } of bindings) {

@@ -3,8 +3,8 @@ import { PACKED, type GeometryReading, type Like } from '../geometry-reading.js'
 import { kernelOf, type ComputeKernel, type Resources, type ShaderDescription } from '../gpu/kernel.js';
 
 /**
- * How a stage shares its work: `parallel`, one thread for each item, as GPUs want it; `serial`, a run of items for each thread and no
- * barriers, for adapters that are a processor in disguise (SwiftShader, llvmpipe, WARP).
+ * Workgroup variant of a stage: `parallel`, one thread for each item, for GPUs; `serial`, a run of items for each
+ * thread and no barriers, for software adapters (SwiftShader, llvmpipe, WARP).
  */
 export type Threads = 'parallel' | 'serial';
 
@@ -13,7 +13,7 @@ export class Stage<S extends ShaderDescription> {
   readonly #kernel: ComputeKernel<S>;
   readonly #groupItems: number;
 
-  /** @param groupItems items of one workgroup */
+  /** @param groupItems Number of items in one workgroup. */
   constructor(device: GPUDevice, shader: S, groupItems = 1) {
     this.#kernel = kernelOf(device, shader);
     this.#groupItems = groupItems;
@@ -23,7 +23,7 @@ export class Stage<S extends ShaderDescription> {
     return this.#kernel.bind(resources);
   }
 
-  /** @param items that there may be: groups beyond those that are end at once */
+  /** @param items Maximum number of items: groups beyond the actual number end at once. */
   record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, items = 1): void {
     this.#kernel.dispatch(pass, bindings, Math.ceil(items / this.#groupItems));
   }
@@ -31,16 +31,16 @@ export class Stage<S extends ShaderDescription> {
 
 const { CHUNK_THREADS, CULL_GROUP, PROJECT_GROUP } = constants;
 
-/** Chunks of a page of `splatCount` splats; each is one workgroup of `cull`. */
+/** Chunks of a block of `splatCount` splats; each is one workgroup of `cull`. */
 export const cullGroups = (splatCount: number): number => Math.ceil(splatCount / CULL_GROUP);
 
-/** In which share each chunk of a page is drawn: 0 where it may hold no visible splat. */
+/** Finds the LOD weight of each chunk of a block: 0 if it cannot hold a visible splat. */
 export const cullChunksStage = (
   device: GPUDevice,
   { cullChunks: own = cullChunks }: GeometryReading = PACKED,
 ): Stage<Like<typeof cullChunks>> => new Stage<Like<typeof cullChunks>>(device, own, CULL_GROUP * CHUNK_THREADS);
 
-/** Which splats of the chunks that are drawn paint anything, and how many of each group of 256. */
+/** Finds the visible splats of the chunks that are drawn, and their number in each group of 256. */
 export const cullStage = (
   device: GPUDevice,
   threads: Threads = 'parallel',
@@ -49,15 +49,16 @@ export const cullStage = (
   new Stage(device, reading[threads === 'serial' ? 'cullSerial' : 'cull'], CULL_GROUP);
 
 /**
- * Makes counts their exclusive prefix sums, in place in a buffer of {@link scanBytes} with the total behind the last, and writes the `Plan` of the later stages.
+ * Replaces counts by their exclusive prefix sums, in place in a buffer of {@link scanBytes} followed by the total, and
+ * writes the `Plan` of the later stages.
  */
 export const planStage = (device: GPUDevice, threads: Threads = 'parallel'): Stage<typeof plan | typeof planSerial> =>
   new Stage(device, threads === 'serial' ? planSerial : plan);
 
-/** Lists the survivors of a page in the file's order. */
+/** Lists the survivors of a block in the order of the file. */
 export const compactStage = (device: GPUDevice): Stage<typeof compact> => new Stage(device, compact, CULL_GROUP);
 
-/** Screen ellipse, color and depth key of the survivors of a page. */
+/** Computes screen ellipse, color and depth key of the survivors of a block. */
 export const projectStage = (device: GPUDevice, reading = PACKED): Stage<GeometryReading['project']> =>
   new Stage(device, reading.project, PROJECT_GROUP);
 

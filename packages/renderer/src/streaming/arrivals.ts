@@ -2,23 +2,23 @@ import { ARRIVED } from './page-rows.js';
 import { NONE, type PageList } from './page-list.js';
 
 export const ARRIVAL_MS = 400;
-/** Frames that a page takes to arrive at least, however slow they are. */
+/** Minimum number of frames over which a page fades in. */
 export const LEAST_STEPS = 16;
 
-/** Pages that take the place of what stood for them, little by little; none before the page above it. */
+/** Fades in pages over their parents; no page before its parent. */
 export class Arrivals {
   readonly #list: PageList;
   readonly #milliseconds: number;
   readonly #setArrived: (page: number, arrived: number) => void;
-  /** [P] how much of the time of a page has passed, 0 to 1; 1 for those that are not {@link #arriving}. */
+  /** [P] elapsed fraction of the fade of each page, 0 to 1; 1 for pages that are not {@link #arriving}. */
   readonly #passed: Float32Array;
   /** Parents before children. */
   readonly #arriving = new Set<number>();
   #steppedAt = 0;
 
   /**
-   * @param milliseconds that it takes, in {@link LEAST_STEPS} frames at least; 0 for at once
-   * @param setArrived gets a page, and how far it has arrived: 0 to `ARRIVED`
+   * @param milliseconds Duration of a fade, over at least {@link LEAST_STEPS} frames; 0 for none.
+   * @param setArrived Is called with a page and its progress: 0 to `ARRIVED`.
    */
   constructor(list: PageList, milliseconds: number, setArrived: (page: number, arrived: number) => void) {
     this.#list = list;
@@ -27,12 +27,12 @@ export class Arrivals {
     this.#passed = new Float32Array(list.count).fill(1);
   }
 
-  /** Pages that have not arrived whole. */
+  /** Number of pages that are still fading in. */
   get count(): number {
     return this.#arriving.size;
   }
 
-  /** A page is there from now on. One that nothing is above of has arrived. */
+  /** Starts the fade of a resident page. A page without a parent is complete at once. */
   begin(page: number): void {
     const isAtOnce = this.#list.parent[page] === NONE || this.#milliseconds === 0;
     if (!isAtOnce) {
@@ -42,13 +42,13 @@ export class Arrivals {
     this.#setArrived(page, isAtOnce ? ARRIVED : 0);
   }
 
-  /** A page has left. */
+  /** Removes an evicted page. */
   forget(page: number): void {
     this.#arriving.delete(page);
     this.#passed[page] = 1;
   }
 
-  /** Lets all go another step: thousands in each frame of a flight. @returns false if there were none */
+  /** Advances all fades; there may be thousands in each frame of a flight. @returns False if there were none. */
   step(now: number): boolean {
     const elapsed = (now - this.#steppedAt) / this.#milliseconds;
     this.#steppedAt = now;
@@ -65,5 +65,8 @@ export class Arrivals {
   }
 }
 
-/** Slow at both ends: an opaque splat in the share w has the opacity 1 − (1 − a)^w, which is a third at the first of sixteen even steps. */
+/**
+ * Eased at both ends: an opaque splat of weight w has the opacity 1 − (1 − a)^w, which is a third at the first of
+ * sixteen linear steps.
+ */
 const eased = (t: number): number => t * t * (3 - 2 * t);

@@ -10,21 +10,27 @@ import {
   type Vector3,
 } from '@gaussian-splat/core';
 
-/** Milliseconds over which motion is measured, twice: the present stretch and the one before it. */
+/** Milliseconds of one measuring interval; motion is compared between the current and the previous one. */
 const STRETCH_MS = 50;
-/** Milliseconds without a camera after which what came before says nothing of what comes next. */
+/** After this time without a camera, ms, earlier samples are discarded. */
 const PAUSE_MS = 250;
-/** A camera may speed up by so much from one stretch to the next. */
+/** Maximum ratio of the speeds of two consecutive intervals. */
 const MOST_GROWTH = 2;
-/** Radians that a camera is thought to turn at most. */
+/** Maximum predicted rotation in radians. */
 const MOST_TURN = 1;
-/** How far rows may be from unit length for a matrix to count as rotation and translation. */
+/** Tolerance of the row lengths of a matrix that counts as rotation and translation. */
 const SKEW = 1e-3;
 
-/** Milliseconds for a page, and for the one above it that has to be there first, to be wished for, read back and sent for; most by which a camera is looked ahead of. */
+/**
+ * Milliseconds to request, read back and fetch a page and its parent, which must be resident first; and the maximum
+ * prediction time.
+ */
 const [LOOK_MS, MOST_AHEAD_MS] = [250, 600];
 
-/** How far ahead of a camera its pages are wished for, in milliseconds. @param arrivalMs milliseconds that a page takes to come */
+/**
+ * Prediction time of a camera for page requests, in milliseconds. @param arrivalMs Milliseconds that a page takes to
+ * arrive.
+ */
 export const aheadMs = (arrivalMs: number): number => Math.min(MOST_AHEAD_MS, LOOK_MS + arrivalMs);
 
 interface Sample {
@@ -42,30 +48,30 @@ interface Velocity {
 const STILL: Vector3 = [0, 0, 0];
 
 /**
- * How a camera moves, and so where it will be: it keeps the speed of the last twentieth of a second, as far as the twentieth before agrees. What rests, jumps, goes to and fro, or is not
- * looked at for a while is thought to stay where it is.
+ * Predicts the motion of a camera: it keeps the speed of the last 50 ms, as far as the 50 ms before agree. A camera
+ * that rests, jumps, oscillates, or was not observed for a while is predicted to stay.
  */
 export class CameraMotion {
   readonly #samples: Sample[] = [];
 
-  /** Takes note of a camera. @param now milliseconds */
+  /** Records a camera. @param now Milliseconds. */
   observe(camera: Camera, now: number): void {
     const last = this.#samples.at(-1);
     if (last && now - last.at > PAUSE_MS) this.#samples.length = 0;
-    // Of whoever draws: one may write into the same matrix for every frame.
+    // Copied, because callers may reuse one matrix for every frame.
     const worldToCamera = Float64Array.from(camera.worldToCamera);
     this.#samples.push({ camera: { ...camera, worldToCamera }, eye: eyeOf(worldToCamera), at: now });
-    // The oldest is the last that is two stretches old; frames that take longer than a stretch leave three.
+    // Keeps the newest sample that is two intervals old; frames longer than an interval leave three samples.
     while (this.#samples.length > 3 && now - this.#samples[1].at >= 2 * STRETCH_MS) this.#samples.shift();
   }
 
-  /** True while the camera moves or turns. */
+  /** Whether the camera moves or rotates. */
   get isMoving(): boolean {
     const { moves, turns } = this.#velocity();
     return length(moves) > 0 || length(turns) > 0;
   }
 
-  /** Where the camera that was noted last will be after so many milliseconds; that camera itself while it does not move. */
+  /** Predicts the last recorded camera after this many milliseconds; returns that camera itself if it does not move. */
   ahead(milliseconds: number): Camera {
     const { camera, eye } = this.#samples.at(-1)!;
     const { moves, turns } = this.#velocity();
@@ -86,7 +92,10 @@ export class CameraMotion {
   }
 }
 
-/** What is left of a speed, given the one before: nothing if they go against one another, else at most {@link MOST_GROWTH} times the one before. */
+/**
+ * Damps a velocity by the previous one: zero if they oppose each other, else at most {@link MOST_GROWTH} times the
+ * previous one.
+ */
 function lasting(before: Vector3, now: Vector3): Vector3 {
   if (dot(before, now) <= 0) return STILL;
   return scale(now, Math.min(1, (MOST_GROWTH * length(before)) / length(now)));
@@ -103,17 +112,17 @@ const row = (m: Matrix4, k: number): Vector3 => [m[4 * k], m[4 * k + 1], m[4 * k
 
 const isRigid = (m: Matrix4): boolean => [0, 1, 2].every((k) => Math.abs(length(row(m, k)) - 1) < SKEW);
 
-/** Axis times angle of the rotation B Aᵀ that takes the axes of one camera to those of another. */
+/** Axis times angle of the rotation B Aᵀ between the axes of two cameras. */
 function rotationVector(a: Matrix4, b: Matrix4): Vector3 {
   const of = (i: number, j: number): number => dot(row(b, i), row(a, j));
   const twice: Vector3 = [of(2, 1) - of(1, 2), of(0, 2) - of(2, 0), of(1, 0) - of(0, 1)];
   const sine = length(twice) / 2;
-  // Half a turn between two frames has no axis, and is no motion.
+  // Half a turn between two frames has no axis, and is not counted as motion.
   if (sine < 1e-9) return STILL;
   return scale(twice, Math.atan2(sine, (of(0, 0) + of(1, 1) + of(2, 2) - 1) / 2) / (2 * sine));
 }
 
-/** A camera's matrix, its axes turned about one in camera coordinates by an angle (Rodrigues' formula), its eye put in a place. */
+/** A camera's matrix with its axes rotated about an axis in camera coordinates (Rodrigues' formula), and another eye. */
 function turned(m: Matrix4, about: Vector3, angle: number, eye: Vector3): Float64Array {
   const axis = angle === 0 ? STILL : scale(about, 1 / length(about));
   const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];

@@ -27,15 +27,15 @@ const HALF_CODE = 2 ** 24;
 const ALL_CODES = 2 ** 48;
 
 /**
- * Makes the words of a page's file, as the GPU reads them, of a coded one.
- * @throws GaussianSplatError `decode/corrupt`, or `decode/truncated`, for bytes that are no such file
+ * Decodes the words of a coded page file for the GPU.
+ * @throws GaussianSplatError `decode/corrupt`, or `decode/truncated`, for malformed bytes.
  */
 export async function decodePage(where: string, bytes: Uint8Array<ArrayBuffer>, file: CodedFile): Promise<ArrayBuffer> {
   const inflated = await inflate(where, bytes, mostBytes(file));
   return new PageDecoder(where, inflated, file).decode();
 }
 
-/** Decompresses at most so many bytes: whatever a file announces, no more are held. */
+/** Inflates at most this many bytes, regardless of the size that a file declares. */
 async function inflate(where: string, bytes: Uint8Array<ArrayBuffer>, most: number): Promise<Uint8Array> {
   const whole = new Uint8Array(most);
   let length = 0;
@@ -67,7 +67,7 @@ class PageDecoder {
   readonly #bytes: Uint8Array;
   readonly #counts: Uint8Array;
   readonly #splats: number;
-  /** Splats that have harmonics. */
+  /** Number of splats with harmonics. */
   #classed = 0;
   readonly #floats: Float32Array;
 
@@ -97,7 +97,7 @@ class PageDecoder {
     this.#undoDifferences(PLANES.harmonics, planesOf(shDegree));
   }
 
-  /** Numbers whose bytes lie plane by plane. */
+  /** Reads numbers whose bytes are stored plane by plane. */
   #readFloats(at: number, count: number): Float32Array {
     const words = new Uint32Array(count);
     for (let k = 0; k < count; k++) {
@@ -157,7 +157,7 @@ class PageDecoder {
     }
   }
 
-  /** Chunks, and the boxes that their centres are in. */
+  /** Chunks, and the boxes of their centers. */
   #putGeometry(words: Uint32Array, bounds: Float32Array): void {
     const { chunks, coding } = this.#file;
     const heads = new Float32Array(words.buffer, words.byteOffset, words.length);
@@ -208,7 +208,7 @@ class PageDecoder {
     }
   }
 
-  /** As packSh of pack/sh.ts has them, `int8`. */
+  /** Layout `int8` of packSh in pack/sh.ts. */
   #putHarmonics(words: Uint32Array): void {
     const { chunks, shDegree, coding } = this.#file;
     const bytes = new Uint8Array(words.buffer, words.byteOffset, 4 * words.length);
@@ -236,7 +236,7 @@ class PageDecoder {
         halves[at / 2 + 2] = halfBits(rest - o / 2);
         const own = classes?.[i] ?? 0;
         if (own === 0) continue;
-        // A scale of 0 stands for zeros.
+        // A scale of 0 means that all coefficients are zero.
         const scale = Math.min(255, coding.scale + CLASS_STEP * (own - 1));
         for (let band = 0; band < shDegree; band++) bytes[at + SCALE_BYTES[band]] = scale;
         for (let k = 0; k < count; k++) {
@@ -255,10 +255,10 @@ class PageDecoder {
 
 const limited = (code: number): number => Math.min(127, Math.max(-127, code));
 
-/** Bytes of the coefficients above the constant one, from the start of a splat. */
+/** Byte offsets of the coefficients above the constant one, from the start of a splat. */
 function harmonicPlaces(degree: number, stride: number): readonly number[] {
   const all = BAND_SIZES.slice(0, degree).reduce((sum, size) => sum + 3 * size, 0);
   const places = Array.from({ length: all }, (_, k) => FIRST_CODE_BYTE + k);
-  // Degree 1 has nine codes and room for eight: see packSh.
+  // Degree 1 has nine codes but eight places: see packSh.
   return places.map((place) => (place < stride ? place : SCALE_BYTES[1]));
 }

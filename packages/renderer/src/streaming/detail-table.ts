@@ -2,10 +2,12 @@ import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
 import { SLOT_CHUNKS } from './manifest.js';
 
 const SLOT_NUMBERS = DETAIL_NUMBERS * SLOT_CHUNKS;
-/** Slots without a change that are written along with those on both sides: their 8 kB cost less than another write. */
+/**
+ * Unchanged slots between changed ones are written as well, up to this number: their 8 kB cost less than another write.
+ */
 export const BRIDGED = 40;
 
-/** The detail rows of all slots as they should be on the GPU. What has changed is written once a frame, neighbours in one piece. */
+/** CPU copy of the LOD rows of all slots. Changes are written once in each frame, neighbors in one range. */
 export class DetailTable {
   readonly #numbers: Float32Array<ArrayBuffer>;
   readonly #isChanged: Uint8Array;
@@ -16,7 +18,7 @@ export class DetailTable {
     this.#isChanged = new Uint8Array(slots);
   }
 
-  /** The numbers of a slot; {@link touch} must follow a change. */
+  /** The rows of a slot; {@link touch} must follow a change. */
   rowsOf(slot: number): Float32Array<ArrayBuffer> {
     return this.#numbers.subarray(SLOT_NUMBERS * slot, SLOT_NUMBERS * (slot + 1));
   }
@@ -27,9 +29,9 @@ export class DetailTable {
   }
 
   /**
-   * Hands over what has changed since the last time.
-   * @param slotsPerBuffer a piece never reaches over a multiple of it
-   * @param write gets the first slot of a piece and the rows of its slots
+   * Writes the changes since the last call.
+   * @param slotsPerBuffer A range never crosses a multiple of it.
+   * @param write Is called with the first slot of a range and the rows of its slots.
    */
   flush(slotsPerBuffer: number, write: (slot: number, rows: Float32Array<ArrayBuffer>) => void): void {
     if (!this.#hasChanged) return;

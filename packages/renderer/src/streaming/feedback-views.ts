@@ -1,28 +1,28 @@
-/** Views that are told apart at a time; of more, those drawn last. */
+/** Maximum number of views that are tracked; the most recently drawn ones are kept. */
 export const MOST_VIEWS = 4;
 
 interface ViewSample {
-  /** Of the scene, when it was looked at. */
+  /** Version of the scene at the feedback pass. */
   readonly version: number;
-  /** It was of this view alone, not of where a camera that moves would be. */
+  /** Whether the pass used only this view, without the predicted one of a moving camera. */
   readonly isStill: boolean;
-  /** Number of the frame that was the last to draw the view. */
+  /** Index of the last frame that drew the view. */
   drawnAt: number;
   requests?: Float32Array;
 }
 
 /**
- * The views that a streamed scene has been looked at from: one that is drawn again as it was need not be looked at again, and what each of several wishes for is wished for until
- * another look at it. What a view depends on is its name.
+ * Views with a feedback pass: a view that is drawn again unchanged needs no other pass, and the requests of each view
+ * stay valid until its next pass. A view is identified by all parameters that it depends on.
  */
 export class FeedbackViews {
-  /** The one looked at last is the last. */
+  /** The most recent one is last. */
   readonly #looks = new Map<string, ViewSample>();
   #frames = 0;
-  /** Frames of the last look and of the one before. */
+  /** Frames at the last two feedback passes. */
   #sampledAt: readonly [number, number] = [0, 0];
 
-  /** A view is drawn. @returns true if the scene was looked at from it as it is */
+  /** Records that a view is drawn. @returns Whether a feedback pass of the unchanged scene exists for it. */
   draw(view: string, version: number): boolean {
     this.#frames++;
     const sample = this.#looks.get(view);
@@ -30,7 +30,7 @@ export class FeedbackViews {
     return sample?.version === version && sample.isStill;
   }
 
-  /** The view that was drawn last is looked at. */
+  /** Starts a feedback pass of the last drawn view. */
   begin(view: string, version: number, isStill: boolean): void {
     this.#looks.delete(view);
     this.#looks.set(view, { version, isStill, drawnAt: this.#frames });
@@ -39,7 +39,7 @@ export class FeedbackViews {
     this.#sampledAt = [this.#frames, this.#sampledAt[0]];
   }
 
-  /** What the last look found. @returns with it what other views wish for that are still drawn */
+  /** Records the result of the pass. @returns It combined with the requests of the other views that are still drawn. */
   end(requests: Float32Array): Float32Array {
     const last = [...this.#looks.values()].at(-1);
     if (last === undefined) return requests;
@@ -52,7 +52,7 @@ export class FeedbackViews {
     return merged;
   }
 
-  /** Nothing that was looked at is as it was. */
+  /** Discards all passes. */
   clear(): void {
     this.#looks.clear();
   }

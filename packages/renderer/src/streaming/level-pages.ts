@@ -8,44 +8,52 @@ import { joinSlots, packRun, type PackedRun } from './pack-run.js';
 import { errorsOfSpacings, spacingOf } from './run-errors.js';
 import { CHUNK_NUMBERS } from '../pack/words.js';
 
-/** A part of a scene whose file has levels of detail of its own. */
+/** A region of a scene whose file has its own levels of detail. */
 export interface LevelBox {
   /** Corners, world units. */
   readonly min: readonly number[];
   readonly max: readonly number[];
-  /** Splats of each level at most, the coarsest first. */
+  /** Maximum number of splats in each level, coarsest first. */
   readonly counts: readonly number[];
 }
 
-/** A level of a box as a page: it takes the place of the next coarser one. */
+/** A level of a box as a page: it replaces the next coarser one. */
 export interface LevelPage {
   readonly box: number;
   /** Index into the box's `counts`: 1 or more. */
   readonly level: number;
-  /** Splats at most. */
+  /** Maximum number of splats. */
   readonly count: number;
-  /** Centre and radius, world units relative to the origin of the scene; the same for all levels of a box, so that only their errors decide. */
+  /**
+   * Center and radius, world units relative to the origin of the scene; the same for all levels of a box, so that only
+   * their errors decide.
+   */
   readonly sphere: readonly number[];
-  /** World units that what is shown is displaced. */
+  /** Error in world units. */
   readonly error: number;
 }
 
-/** A scene whose file has levels of its own, ready to be streamed. Plain data with a transferable buffer, so that a worker can make it. */
+/**
+ * A scene whose file has its own levels, ready for streaming. Plain data with a transferable buffer, so that a worker
+ * can build it.
+ */
 export interface LevelScene {
   readonly scene: StreamedScene;
-  /** The page of all that is shown from the start: the coarsest level of each box, and what is in no box. */
+  /** The page that is always resident: the coarsest level of each box, and the splats outside all boxes. */
   readonly first: Uint32Array<ArrayBuffer>;
-  /** Chunks of each box in it, one after the other. */
+  /** Chunks of each box in it, in sequence. */
   readonly firstChunks: readonly number[];
-  /** All other pages, box by box, the coarser before the finer. */
+  /** All other pages, box by box, coarser before finer. */
   readonly pages: readonly LevelPage[];
 }
 
 /**
- * Lays out a scene whose file has levels of its own. What the levels displace is not known before they are there: the distance of splats is measured in the coarsest,
- * and is taken to go with the square root of their number, as for splats on surfaces.
- * @param coarsest the coarsest level of each box: its `levelRuns` have the number of the box as `node`. Runs of other nodes are shown always.
- * @param boxes each with one level or more
+ * Lays out a scene whose file has its own levels. Their errors are unknown before they are loaded: the spacing of
+ * splats is measured in the coarsest level, and assumed to scale with the inverse square root of their number, as for
+ * splats on surfaces.
+ * @param coarsest The coarsest level of each box: its `levelRuns` have the index of the box as `node`. Runs of other
+ * nodes are always shown.
+ * @param boxes Each with at least one level.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function layOutLevels(
@@ -88,7 +96,7 @@ export function layOutLevels(
   return { scene, first: joinSlots(runs, scene), firstChunks, pages };
 }
 
-/** Usable splats of each box, neighbours together, and behind them those that are in none. */
+/** Usable splats of each box, neighbors together, followed by those outside all boxes. */
 function keptOfNodes({ positions, levelRuns = [] }: GaussianCloud, usable: Uint32Array, boxes: number): Uint32Array[] {
   const kept: Uint32Array[] = Array.from({ length: boxes }, () => new Uint32Array(0));
   const others: number[] = [];
@@ -103,7 +111,7 @@ function keptOfNodes({ positions, levelRuns = [] }: GaussianCloud, usable: Uint3
   return [...kept, mortonOrder(positions, Uint32Array.from(others))];
 }
 
-/** What is in no box, the sky for one, says nothing of where the scene is. */
+/** Splats outside all boxes, such as the sky, do not indicate the position of the scene. */
 function boundsWithin(cloud: GaussianCloud, boxes: number): Bounds {
   const runs = (cloud.levelRuns ?? []).filter(({ node, count }) => node < boxes && count > 0);
   const total = runs.reduce((sum, { count }) => sum + count, 0);
@@ -118,7 +126,10 @@ function boundsWithin(cloud: GaussianCloud, boxes: number): Bounds {
   return boundsOf({ count: total, positions, opacities, origin: cloud.origin });
 }
 
-/** Errors of the levels of a box, the coarsest first, by the spacing of that, or, where it has none, by the radius of the box. */
+/**
+ * Errors of the levels of a box, coarsest first, from the measured spacing, or from the radius of the box if there is
+ * none.
+ */
 function errorsOf(counts: readonly number[], measured: number, radius: number): number[] {
   const spacing = measured > 0 ? measured : (2 * radius) / Math.sqrt(counts[0]);
   const spacings = counts.map((count) => spacing * Math.sqrt(counts[0] / count));
@@ -127,10 +138,10 @@ function errorsOf(counts: readonly number[], measured: number, radius: number): 
 
 type Corners = Pick<LevelBox, 'min' | 'max'>;
 
-/** Factor by which the radius is larger than it need be: more than float32 rounds. */
+/** Factor that enlarges the radius by more than the rounding error of float32. */
 const SPARE = 1.00001;
 
-/** Centre and radius of a ball around the boxes of chunks, and around a box that all levels are said to lie in. */
+/** Center and radius of a sphere around the boxes of chunks, and around the declared box of all levels. */
 function sphereAround(chunks: Float32Array, box?: Corners): number[] {
   const low = box ? box.min.map((x, axis) => Math.min(x, box.max[axis])) : [Infinity, Infinity, Infinity];
   const high = box ? box.max.map((x, axis) => Math.max(x, box.min[axis])) : [-Infinity, -Infinity, -Infinity];

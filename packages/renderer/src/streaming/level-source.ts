@@ -10,9 +10,9 @@ import { slotBySlot, type SlotWords } from './slot-words.js';
 import { chunksOf } from '../levels/splat-level.js';
 
 /**
- * The words of a page.
- * @param cloud its splats
- * @throws GaussianSplatError `argument/cloud` for a cloud without a splat that can be drawn, or with more than the page has.
+ * Returns the words of a page.
+ * @param cloud Its splats.
+ * @throws GaussianSplatError `argument/cloud` for a cloud without usable splats, or with more than the page has.
  */
 export function packLevelPage(
   cloud: GaussianCloud,
@@ -33,14 +33,14 @@ export function packLevelPage(
   return joinSlots([{ ...run, sphere, error }], scene);
 }
 
-/** The cloud relative to the origin of the scene, and with harmonics of its degree. */
+/** The cloud relative to the origin of the scene, with harmonics of its degree. */
 function placedIn(cloud: GaussianCloud, { origin, shDegree }: StreamedScene): GaussianCloud {
   const shift = cloud.origin.map((x, axis) => x - origin[axis]);
   const positions = shift.every((x) => x === 0) ? cloud.positions : cloud.positions.map((x, i) => x + shift[i % 3]);
   return { ...cloud, origin, positions, sh: shOfDegree(cloud, shDegree), shDegree };
 }
 
-/** Harmonics cut off above a degree, or filled up with zeros. */
+/** Harmonics truncated to a degree, or padded with zeros. */
 function shOfDegree(cloud: GaussianCloud, degree: ShDegree): Float32Array {
   if (cloud.shDegree === degree) return cloud.sh;
   const [from, to] = [cloud.shDegree, degree].map((one) => 3 * shCoefficientCount(one));
@@ -67,9 +67,9 @@ function listLevels({ first, firstChunks, pages, scene }: LevelScene): PageList 
 }
 
 /**
- * The pages of a scene whose file has levels of its own.
- * @param levels whose first page is the source's afterwards
- * @param fetchLevel brings a page: see {@link packLevelPage}. Best done in a worker.
+ * Returns the page source of a scene whose file has its own levels.
+ * @param levels Its first page is transferred to the source.
+ * @param fetchLevel Fetches a page: see {@link packLevelPage}. Best done in a worker.
  */
 export function levelSource(
   levels: LevelScene,

@@ -5,42 +5,48 @@ import { CLASSES, CLASS_STEP, LEAST_OPACITY_STEP, type PageCoding } from './page
 import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from '../pack/words.js';
 
-/** Chunks that stand for the same one, at most: those of a page, which fill a slot of the pool. */
+/** Maximum number of chunks with the same parent: those of a page, which fill a slot of the pool. */
 export const { SLOT_CHUNKS } = constants;
-/** Chunks of a file at most: four that have one parent, and what those four stand for. */
+/** Maximum number of chunks in a file: four with one parent, and the children of these four. */
 const FILE_CHUNKS = 20;
-/** Pages of all instances at most, for 4.3 billion splats. Each takes some 90 bytes of the page's memory before any is there, and shaders number them with 24 bits. */
+/**
+ * Maximum number of pages over all instances, for 4.3 billion splats. Each takes about 90 bytes of CPU memory before
+ * any is loaded, and shaders index them with 24 bits.
+ */
 export const MOST_PAGES = 1 << 22;
 
-/** A file of a tree: a page of chunks that have one parent, and behind it the pages below each of these chunks in turn, all full but the last. */
+/**
+ * A file of a tree: a page of chunks with one parent, followed by the child pages of each of these chunks, all full but
+ * the last.
+ */
 export interface TreePage {
   /** Address, relative to the manifest. */
   readonly file: string;
   readonly chunks: number;
-  /** How many of them, the first, have their parent in another file or none. */
+  /** Number of its first chunks that have their parent in another file or none. */
   readonly upper: number;
-  /** File of the tree that holds the chunk above, and the number of that chunk in it. None for the first file of a tree. */
+  /**
+   * File of the tree that holds the parent, and the index of the parent chunk in it. Missing for the first file of a
+   * tree.
+   */
   readonly parent?: readonly [page: number, chunk: number];
 }
 
-/** Files that hang together, parents before children. */
+/** Files of a tree, parents before children. */
 export interface Tree {
   readonly pages: readonly TreePage[];
 }
 
-/** A tree at its place in the scene, below a chunk of the first one. */
+/** An instance of a tree at its position in the scene, below a chunk of the first instance. */
 export interface TreeInstance {
   readonly tree: number;
   /** World units, added to every position of the tree. */
   readonly translate: Vector3;
-  /** File of the first instance, and chunk in it, that the tree is the detail of. None for the first instance. */
+  /** File of the first instance, and chunk in it, that the tree refines. Missing for the first instance. */
   readonly parent?: readonly [page: number, chunk: number];
 }
 
-/**
- * What `detail.json` says of a streamed scene.
- * docs/lod-format.md describes the files.
- */
+/** Manifest (`lod.json`) of a streamed scene. docs/lod-format.md describes the files. */
 export interface DetailManifest {
   readonly format: 'gaussian-splat-detail';
   /** 2 if {@link geometry} is given, 4 if {@link coding} is, too. 3 was never released. */
@@ -49,14 +55,17 @@ export interface DetailManifest {
   readonly splats: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
-  /** How centres, shapes and opacities are stored: {@link packQuantizedChunk}. Default: as `PackedGaussian`, in twice the bytes. */
+  /**
+   * Storage of centers, shapes and opacities: {@link packQuantizedChunk}. Default: as `PackedGaussian`, in twice the
+   * bytes.
+   */
   readonly geometry?: 'quantized';
-  /** How files are coded: `decodePage` makes the words of them. Default: they are the words. */
+  /** Coding of the files, which `decodePage` converts to words. Default: files contain the words. */
   readonly coding?: PageCoding;
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
-  /** Order of splats that the scene was trained with; undefined is that of their centers. */
+  /** Sort order of splats in training; undefined is that of their centers. */
   readonly order?: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
@@ -64,10 +73,10 @@ export interface DetailManifest {
   readonly instances: readonly TreeInstance[];
 }
 
-/** What the size of a page depends on. */
+/** Properties that determine the size of a page. */
 export type PageFormat = Pick<DetailManifest, 'shDegree' | 'shPrecision' | 'geometry'>;
 
-/** Words of each part of a file, or of a page, one after the other. */
+/** Words of each section of a file, or of a page, in sequence. */
 export function pageLayout(
   { shDegree, shPrecision, geometry }: PageFormat,
   chunks: number,
@@ -86,15 +95,16 @@ function shown(value: unknown): string {
   try {
     return String(JSON.stringify(value)).slice(0, 80);
   } catch {
-    // Lists within lists, more than calls can be within calls.
+    // Lists may be nested deeper than calls can be.
     return 'a value that is too deep to be shown';
   }
 }
 
 /**
- * Checks what was read from a `detail.json`.
- * @param mostPages pages that the load may take memory for
- * @throws GaussianSplatError `out-of-memory/budget` for more, `decode/unsupported` for another format or version, `decode/header` for anything else that is wrong.
+ * Validates a parsed manifest.
+ * @param mostPages Maximum number of pages that the load may hold in memory.
+ * @throws GaussianSplatError `out-of-memory/budget` for more, `decode/unsupported` for another format or version,
+ * `decode/header` for other faults.
  */
 export function checkManifest(value: unknown, where: string, mostPages = MOST_PAGES): DetailManifest {
   const manifest = (typeof value === 'object' && value !== null ? value : {}) as Partial<DetailManifest>;
@@ -145,7 +155,7 @@ export function checkManifest(value: unknown, where: string, mostPages = MOST_PA
   return manifest as DetailManifest;
 }
 
-/** Least and most of what a coding says; colours may be of any size. */
+/** Lower and upper limits of the values of a coding; color steps may have any size. */
 const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [least: number, most: number]>> = {
   size: [1 / 48, 1],
   directions: [3, 255],
@@ -166,7 +176,7 @@ function checkCoding({ version, coding, shPrecision }: Partial<DetailManifest>, 
   }
 }
 
-/** What files and instances must agree in, each of which is fine by itself. */
+/** Checks the consistency of files and instances that are valid on their own. */
 function checkPages({ trees, instances }: DetailManifest, fail: Fail, mostPages: number): void {
   const lengths = new Map<string, number>();
   const taken = trees.map((tree, t) => {
@@ -190,10 +200,10 @@ function checkPages({ trees, instances }: DetailManifest, fail: Fail, mostPages:
     fail('instances', `at most ${mostPages} pages in a file of this size`, count, 'out-of-memory/budget');
 }
 
-/** Pages that lie in a file. */
+/** Number of pages in a file. */
 const pagesIn = ({ chunks, upper }: TreePage): number => 1 + Math.ceil((chunks - upper) / SLOT_CHUNKS);
 
-/** Chunks of a tree that have something below them. */
+/** Chunks of a tree that have children. */
 class Places {
   readonly #pages: readonly TreePage[];
   readonly #taken = new Set<number>();
@@ -202,7 +212,7 @@ class Places {
     this.#pages = pages;
   }
 
-  /** Puts something below a chunk. @returns false if there is something already */
+  /** Marks a chunk as having children. @returns False if it was marked already. */
   take([page, chunk]: readonly [number, number]): boolean {
     const place = FILE_CHUNKS * page + chunk;
     const isTaken = this.#taken.has(place) || chunk < pagesIn(this.#pages[page]) - 1;
@@ -235,7 +245,7 @@ const isCount = (value: unknown): value is number => Number.isSafeInteger(value)
 const isVector = (value: unknown): value is Vector3 =>
   Array.isArray(value) && value.length === 3 && value.every((number) => Number.isFinite(number));
 
-/** Whether it names a chunk of one of the first files, as many as `end` says. */
+/** Whether the value is the position of a chunk in one of the first `end` files. */
 function isPlace(value: unknown, pages: readonly TreePage[], end = pages.length): boolean {
   if (!Array.isArray(value) || value.length !== 2) return false;
   const [page, chunk] = value as [unknown, unknown];

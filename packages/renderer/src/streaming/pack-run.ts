@@ -12,24 +12,24 @@ import { CHUNK_NUMBERS } from '../pack/words.js';
 
 const { CULL_GROUP } = constants;
 
-/** Splats in whole chunks, the last filled up. */
+/** Splats in whole chunks, the last one padded. */
 export interface RunWords {
   readonly geometry: Uint32Array;
   readonly sh: Uint32Array;
   readonly chunks: Float32Array;
 }
 
-/** All chunks of a run have one sphere and one error. */
+/** A run whose chunks have one sphere and one error. */
 export interface PackedRun extends RunWords {
-  /** Centre and radius. */
+  /** Center and radius. */
   readonly sphere: readonly number[];
   /** World units. */
   readonly error: number;
 }
 
 /**
- * Packs some splats of a cloud, in that order.
- * @param place where a run stands that has nothing to draw: one chunk of nothing, which what is finer can take the place of
+ * Packs some splats of a cloud, in the given order.
+ * @param place Position of a run without drawable splats: one empty chunk, which finer ones can replace.
  */
 export function packRun(
   cloud: GaussianCloud,
@@ -61,7 +61,7 @@ function quantizeRun({ geometry, chunks }: RunWords, level: SplatLevel): void {
   }
 }
 
-/** Puts runs one behind the other into slots: of each what docs/lod-format.md describes, all but the last full. Nothing is above any of them. */
+/** Joins runs in slots: each has the layout of docs/lod-format.md, all but the last full. None of them has a parent. */
 export function joinSlots(runs: readonly PackedRun[], format: PageFormat): Uint32Array<ArrayBuffer> {
   const total = runs.reduce((sum, { chunks }) => sum + chunks.length / CHUNK_NUMBERS, 0);
   const words = new Uint32Array(pageLayout(format, 1).total * total);

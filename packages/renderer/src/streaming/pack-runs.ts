@@ -12,7 +12,7 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from '../pac
 
 const { CULL_GROUP } = constants;
 
-/** A run of usable splats, neighbours together. */
+/** A run of usable splats, neighbors together. */
 interface PackedRun extends LevelRun {
   readonly kept: Uint32Array;
   /** See {@link spacingOf}, world units. */
@@ -20,8 +20,8 @@ interface PackedRun extends LevelRun {
 }
 
 /**
- * Packs a cloud whose file has levels of detail of its own (`levelRuns`), each run from a chunk's start on: of every node the level is drawn whose error on screen is small
- * enough, by the rule of all levels of detail.
+ * Packs a cloud whose file has its own levels of detail (`levelRuns`), with each run aligned to a chunk: the level of
+ * each node is selected by its screen error, by the rule of all levels of detail.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packLevelRuns(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
@@ -66,7 +66,7 @@ function packRuns(
   return packed;
 }
 
-/** Runs with anything in them, those of one node together, the finest of it first. */
+/** Non-empty runs, those of one node together, the finest first. */
 function keptRuns({ positions, levelRuns = [] }: GaussianCloud, usable: Uint32Array): PackedRun[] {
   const byPlace = [...levelRuns].sort((a, b) => a.first - b.first);
   let at = 0;
@@ -104,7 +104,7 @@ function writeDetails(
   }
 }
 
-/** Centre and radius of a ball around the boxes of some chunks. */
+/** Center and radius of a sphere around the boxes of some chunks. */
 function sphereAround(chunks: Float32Array, first: number, end: number): Float32Array {
   const corner = (axis: number, place: number, pick: (a: number, b: number) => number): number => {
     let found = chunks[CHUNK_NUMBERS * first + place + axis];

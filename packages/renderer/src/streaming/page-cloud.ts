@@ -14,16 +14,19 @@ const { CULL_GROUP, QUANTIZED_HEAD_ROWS, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO, QU
 
 /** Some chunks of a file. */
 export interface PageChunks {
-  /** As the GPU reads them, quantized. */
+  /** In the quantized layout of the GPU. */
   readonly words: Uint32Array<ArrayBuffer>;
-  /** Chunks of the file, and which of them are meant. */
+  /** Number of chunks in the file, and the selected ones. */
   readonly of: number;
   readonly chunks: readonly number[];
   /** World units, added to every position; default none. */
   readonly translate?: Vector3;
 }
 
-/** The splats of some chunks as a cloud, those left out that nothing shows of: for renderers without pages, and for tools that ask how near pages are to the scene that they were made of. */
+/**
+ * Returns the visible splats of some chunks as a cloud: for renderers without pages, and for tools that compare pages
+ * with their source scene.
+ */
 export function cloudOfChunks(
   scene: Pick<DetailManifest, 'shDegree' | 'shPrecision' | 'antialiased' | 'filterVariance' | 'origin'>,
   parts: readonly PageChunks[],

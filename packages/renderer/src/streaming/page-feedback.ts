@@ -9,10 +9,16 @@ import { constants } from '../generated/shaders.js';
 import { pageFeedback } from '../generated/streamed-shaders.js';
 import { Stage } from '../stages/stage.js';
 
-/** Frames between two looks at what is wished for: of a camera that rests, and of one that moves. Both odd, for two views that are drawn in turn. */
+/**
+ * Frames between two feedback passes: of a resting camera, and of a moving one. Both odd, so that two views that are
+ * drawn alternately both get passes.
+ */
 const INTERVAL = 5;
 const MOVING_INTERVAL = 3;
-/** Milliseconds after which views that nobody has looked at are drawn once more, to look; for so long those that have been looked at give way to them. */
+/**
+ * Milliseconds after which views without a feedback pass are drawn again to get one; until then views with one are
+ * skipped in their favor.
+ */
 const STALE_MS = 120;
 
 /** Numbers of `ahead` in shaders/page_feedback.wgsl: four columns and the eye. */
@@ -20,22 +26,28 @@ const AHEAD_NUMBERS = 20;
 
 export interface PageFeedbackOptions {
   readonly pages: number;
-  /** Of the scene: world position that all positions are relative to. */
+  /** World position of the origin of all positions. */
   readonly origin: Vector3;
-  /** Milliseconds that a page takes until it is there: so far ahead of a camera that moves is looked. */
+  /** Prediction time of a moving camera in milliseconds: the arrival time of a page. */
   readonly aheadMs: () => number;
-  /** Grows with all that the scene has more or less of. */
+  /** Changes when pages arrive or are evicted. */
   readonly version: () => number;
-  /** Called with the pixels that doing without each page costs the view, or the one that it will have become; and with the most that the view lacks. */
+  /**
+   * Called with the screen errors in pixels of all missing pages, for the view or the predicted one; and with the
+   * largest error of the view.
+   */
   readonly onFeedback: (requests: Float32Array, lacking: number) => void;
-  /** Called when the last view has not been looked at for want of another frame. */
+  /** Called when the last view lacks a feedback pass and needs another frame. */
   readonly onStale: () => void;
 }
 
-/** Brings what views wish for back from the GPU, now and then, with nobody waiting for it. */
+/** Reads the page requests of views back from the GPU at intervals, asynchronously. */
 export class PageFeedback implements PageRequests {
   readonly #stage: Stage<typeof pageFeedback>;
-  /** For each page the bits of the pixels that doing without it costs, a float32; at 0, the page that is always there, what the view lacks. Cleared before each look. */
+  /**
+   * For each page the screen error of its absence, float32 bits; at 0, the page that is always resident, the largest
+   * error of the view. Cleared before each pass.
+   */
   readonly #requests: GPUBuffer;
   readonly #staging: GPUBuffer;
   readonly #ahead: GPUBuffer;
@@ -43,7 +55,7 @@ export class PageFeedback implements PageRequests {
   readonly #options: PageFeedbackOptions;
   readonly #motion = new CameraMotion();
   readonly #views = new FeedbackViews();
-  /** Views drawn of late that nobody has looked at. */
+  /** Recently drawn views without a feedback pass. */
   readonly #unseen = new Set<string>();
   #givesWayUntil = -Infinity;
   #frames = INTERVAL;
@@ -61,7 +73,10 @@ export class PageFeedback implements PageRequests {
     this.#ahead = memory.buffer('gs.requests.ahead', 4 * AHEAD_NUMBERS, uniform | copyDestination);
   }
 
-  /** True for a frame that must note wishes; then {@link begin}, {@link note}, {@link copy} and, after the submit, {@link read} follow. */
+  /**
+   * Whether this frame must record requests; then {@link begin}, {@link note}, {@link copy} and, after the submit,
+   * {@link read} follow.
+   */
   isDue(camera: Camera, levers: FeedbackSettings): boolean {
     const now = performance.now();
     this.#motion.observe(camera, now);
@@ -80,7 +95,7 @@ export class PageFeedback implements PageRequests {
     clearTimeout(this.#timer);
   }
 
-  /** Sees to it that no view is left that nobody has looked at, though no other frame be drawn. */
+  /** Ensures that every view gets a feedback pass, even if no other frame is drawn. */
   #wait(view: string, isSeen: boolean): void {
     this.#unseen.delete(view);
     if (!isSeen) this.#unseen.add(view);
@@ -108,7 +123,7 @@ export class PageFeedback implements PageRequests {
   }
 
   bind(page: FeedbackInputs): GPUBindGroup {
-    // Another size, or other scenes in the same picture.
+    // The image size or the set of scenes has changed.
     this.#views.clear();
     return this.#stage.bind({ ...page, ahead: this.#ahead, requests: this.#requests });
   }
@@ -136,7 +151,7 @@ export class PageFeedback implements PageRequests {
   }
 }
 
-/** All that a look depends on, but for the content of the scene. */
+/** Identifies all parameters of a feedback pass, except the content of the scene. */
 function nameOf(camera: Camera, { detail, detailFade, splatBudget }: FeedbackSettings): string {
   const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
   return [...worldToCamera, width, height, fx, fy, cx, cy, near, far, detail, detailFade, splatBudget].join(' ');

@@ -7,36 +7,36 @@ export { NONE };
 /** The pages of a streamed scene, parents before children. */
 export interface PageList {
   readonly count: number;
-  /** [P] slots that a page takes, one for each {@link SLOT_CHUNKS} chunks. */
+  /** [P] number of slots of each page, one for each {@link SLOT_CHUNKS} chunks. */
   readonly slots: Uint32Array;
-  /** [P] chunks of a page; those of a run are fewer if some of its splats cannot be drawn. */
+  /** [P] number of chunks of each page; a run has fewer if some of its splats are unusable. */
   readonly chunks: Uint32Array;
-  /** [P] how many of them have their parent in another page or none. */
+  /** [P] number of chunks that have their parent in another page or none. */
   readonly upper: Uint32Array;
-  /** [P] page that holds the chunks above, or {@link NONE}, the first of these chunks in it and their number. */
+  /** [P] page of the parent chunks, or {@link NONE}, the first of these chunks in it and their number. */
   readonly parent: Uint32Array;
   readonly parentChunk: Uint32Array;
   readonly parentChunks: Uint32Array;
-  /** [P] where a page's chunks begin in {@link children}. */
+  /** [P] index of a page's first chunk in {@link children}. */
   readonly firstChunk: Uint32Array;
-  /** Page that holds what each chunk stands for, or {@link NONE}; {@link SLOT_CHUNKS} for each slot. */
+  /** Page with the children of each chunk, or {@link NONE}; {@link SLOT_CHUNKS} for each slot. */
   readonly children: Uint32Array;
 }
 
-/** Where a page of a folder lies: in a file, of so many chunks, from one of them on. */
+/** Location of a page of a folder: a file, the first chunk in it, and the number of chunks. */
 export interface PagePlace {
   readonly file: TreePage;
   readonly first: number;
   readonly chunks: number;
 }
 
-/** The pages of all instances of a scene, numbered through, the first instance first. */
+/** The pages of all instances of a scene, numbered consecutively, first instance first. */
 export interface InstanceList extends PageList {
   readonly place: (page: number) => PagePlace;
   readonly translate: (page: number) => Vector3;
 }
 
-/** Pages of so many slots each, none of which is below another yet. */
+/** A list of pages with these numbers of slots, without parents yet. */
 export function emptyList(slots: Uint32Array): PageList {
   const count = slots.length;
   const firstChunk = new Uint32Array(count);
@@ -52,7 +52,7 @@ export function emptyList(slots: Uint32Array): PageList {
   };
 }
 
-/** Puts a page below some chunks of an earlier one. */
+/** Makes a page the child of some chunks of an earlier one. */
 export function putBelow(list: PageList, page: number, parent: number, firstChunk: number, chunks: number): void {
   list.parent[page] = parent;
   list.parentChunk[page] = firstChunk;
@@ -61,13 +61,13 @@ export function putBelow(list: PageList, page: number, parent: number, firstChun
   list.children.fill(page, from, from + chunks);
 }
 
-/** Numbers of the pages below the chunks of a page that are in one of its slots, {@link NONE} where there is none. */
+/** Indices of the child pages of the chunks in one slot of a page, {@link NONE} for none. */
 export function childrenIn(list: PageList, page: number, slot: number): Uint32Array {
   const from = list.firstChunk[page] + SLOT_CHUNKS * slot;
   return list.children.subarray(from, from + Math.min(SLOT_CHUNKS, list.chunks[page] - SLOT_CHUNKS * slot));
 }
 
-/** [P] 1 for pages that with all that is above them take more than so many slots. */
+/** [P] 1 for pages that need more slots, including all their ancestors, than this limit. */
 export function largerThan(most: number, { count, slots, parent }: PageList): Uint8Array {
   const withAbove = new Float64Array(count);
   for (let page = 0; page < count; page++) {
@@ -76,12 +76,12 @@ export function largerThan(most: number, { count, slots, parent }: PageList): Ui
   return Uint8Array.from(withAbove, (needed) => (needed > most ? 1 : 0));
 }
 
-/** A page of a tree, and the page and chunk in it that it is below. */
+/** A page of a tree, and its parent page and chunk. */
 interface TreePart extends PagePlace {
   readonly parent?: readonly [part: number, chunk: number];
 }
 
-/** The pages of a tree, and for each of its files the first of them. */
+/** The pages of a tree, and the index of the first page of each of its files. */
 function partsOf({ pages }: Tree): { readonly parts: readonly TreePart[]; readonly firsts: readonly number[] } {
   const [parts, firsts]: [TreePart[], number[]] = [[], []];
   for (const file of pages) {
@@ -96,7 +96,7 @@ function partsOf({ pages }: Tree): { readonly parts: readonly TreePart[]; readon
   return { parts, firsts };
 }
 
-/** The page that holds a chunk of a file, and its number there. */
+/** The page that holds a chunk of a file, and its index in that page. */
 function partAt(
   files: readonly TreePage[],
   firsts: readonly number[],
@@ -122,7 +122,7 @@ export function listPages({ trees, instances }: DetailManifest): InstanceList {
       list.chunks[first + p] = chunks;
       list.upper[first + p] = chunks;
       if (parent) putBelow(list, first + p, first + parent[0], parent[1], 1);
-      // The first instance has the first numbers.
+      // The first instance has the lowest indices.
       else if (above)
         putBelow(list, first + p, ...partAt(trees[instances[0].tree].pages, cut[instances[0].tree].firsts, above), 1);
     });

@@ -14,9 +14,12 @@ import { chunkLayout, movePoints, numbersOf, startOf, type ChunkLayout, type Slo
 import { CHUNK_NUMBERS } from '../pack/words.js';
 
 const SLOT_SPLATS = SLOT_CHUNKS * constants.CULL_GROUP;
-/** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */
+/** Maximum size of a pool's buffer in bytes: several of this size can be allocated when one large one cannot (iOS). */
 const LARGEST_BUFFER = 1 << 27;
-/** Of what a pool may take, a share for uploads to pass through, and the most bytes that serve: with so many one in a hundred found no room where frames upload all they may. */
+/**
+ * Fraction of the pool's memory for staging uploads, and its upper limit in bytes: with that many, one frame in a
+ * hundred lacked staging memory at the maximum upload rate.
+ */
 const STAGING = { share: 1 / 32, most: 24e6 } as const;
 
 /** Bytes of GPU memory that one slot takes. */
@@ -24,19 +27,19 @@ export function slotBytes(format: PageFormat): number {
   return 4 * pageLayout(format, SLOT_CHUNKS).total;
 }
 
-/** What a pool consists of. */
+/** Size of a pool. */
 export interface PoolSize {
   readonly slots: number;
-  /** Blocks of mapped memory that uploads pass through. */
+  /** Number of staging blocks of mapped memory. */
   readonly blocks: number;
 }
 
-/** Bytes of GPU memory that slots and blocks take. */
+/** Bytes of GPU memory of slots and staging blocks. */
 export const poolBytes = (format: PageFormat, { slots, blocks }: PoolSize): number =>
   slots * slotBytes(format) + blocks * BLOCK_BYTES;
 
 /**
- * A pool for which so many bytes are enough, of no more slots than the pages take.
+ * Returns the largest pool within this number of bytes, with at most as many slots as the pages need.
  * @throws GaussianSplatError `out-of-memory/budget` if the first page does not fit.
  */
 export function poolSize(format: PageFormat, list: PageList, budget: number): PoolSize {
@@ -53,14 +56,17 @@ export function poolSize(format: PageFormat, list: PageList, budget: number): Po
   });
 }
 
-/** Slots on the GPU, allocated once, each with room for one page of a streamed scene or a part of it. What is in a slot without page is never drawn. */
+/**
+ * Slots on the GPU, allocated once, each for one page of a streamed scene or a part of one. The content of a slot
+ * without a page is never drawn.
+ */
 export class PagePool {
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
   readonly #layout: ChunkLayout;
-  /** Boxes of the chunks of the slot that is written. */
+  /** Boxes of the chunks of the slot that is being written. */
   readonly #boxes = new Float32Array(CHUNK_NUMBERS * SLOT_CHUNKS);
-  /** Slots that lie in one buffer. */
+  /** Number of slots in one buffer. */
   readonly slotsPerBuffer: number;
   readonly #mover: SlotMover;
   readonly #belt: StagingBelt;
@@ -91,13 +97,13 @@ export class PagePool {
   }
 
   /**
-   * Puts chunks into a slot, straight from the file that they lie in: another copy would cost the thread as much again. Their details are written by {@link writeDetails};
-   * {@link flush} must follow before the slot is drawn.
-   * @param by world units, added to all positions
+   * Writes chunks into a slot, directly from their file, because another copy would cost as much time again. {@link
+   * writeDetails} writes their LOD rows; {@link flush} must follow before the slot is drawn.
+   * @param by World units, added to all positions.
    */
   write(slot: number, words: SlotWords, by: Vector3): void {
     const { page, place } = this.#find(slot);
-    // Part of it may be submitted before all of it has been written.
+    // A part may be submitted before everything has been written.
     this.#mover.forget(slot);
     const layout = this.#layout;
     const first = SLOT_CHUNKS * place;
@@ -114,13 +120,16 @@ export class PagePool {
     if (this.#mover.isFull) this.flush();
   }
 
-  /** Writes detail rows, {@link SLOT_CHUNKS} for each slot from the given one on; all of them lie in one buffer. {@link flush} must follow. */
+  /**
+   * Writes LOD rows, {@link SLOT_CHUNKS} for each slot from the given one on; all of them must lie in one buffer.
+   * {@link flush} must follow.
+   */
   writeDetails(first: number, rows: Float32Array<ArrayBuffer>): void {
     const { page, place } = this.#find(first);
     this.#write(page.details!, 4 * DETAIL_NUMBERS * SLOT_CHUNKS * place, wordsOf(rows));
   }
 
-  /** Submits what has been written. */
+  /** Submits all writes. */
   flush(): void {
     if (this.#belt.isEmpty && this.#mover.isEmpty) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.pool' });
@@ -133,7 +142,7 @@ export class PagePool {
   #write(to: GPUBuffer, at: number, words: Uint32Array<ArrayBuffer>): void {
     const taken = this.#belt.write(to, at, words);
     if (taken === words.length) return;
-    // What has been written before must not come later than this.
+    // Earlier writes must not execute after this one.
     this.flush();
     this.#device.queue.writeBuffer(to, at + 4 * taken, words, taken);
   }

@@ -1,19 +1,19 @@
 import { NONE } from './page-list.js';
 
-/** A page that has come, and those that have left for it. */
+/** A new page, and the pages that were evicted for it. */
 export interface Settled {
   readonly slots: readonly number[];
   readonly left: readonly { readonly page: number; readonly slots: readonly number[] }[];
 }
 
-/** Which pages are in which slots of a pool. */
+/** Maps pages to the slots of a pool. */
 export class PageSlots {
   /** [S] page in each slot, or {@link NONE}. */
   readonly pageIn: Uint32Array;
   /** [P] first slot of each page, or {@link NONE}. */
   readonly slotOf: Uint32Array;
   readonly #slotsOf = new Map<number, readonly number[]>();
-  /** Empty slots, the next to be filled last. */
+  /** Empty slots; the last one is filled next. */
   readonly #empty: number[];
 
   constructor(pages: number, slots: number) {
@@ -27,22 +27,22 @@ export class PageSlots {
     return this.#empty.length;
   }
 
-  /** Number of pages that have slots. */
+  /** Number of resident pages. */
   get count(): number {
     return this.#slotsOf.size;
   }
 
-  /** The pages that have slots. */
+  /** The resident pages. */
   pages(): Iterable<number> {
     return this.#slotsOf.keys();
   }
 
-  /** Slots of a page, in the order of its chunks; none of one that has none. */
+  /** Slots of a page, in the order of its chunks; empty if it is not resident. */
   of(page: number): readonly number[] {
     return this.#slotsOf.get(page) ?? [];
   }
 
-  /** Gives a page so many of the empty slots. @returns them */
+  /** Assigns empty slots to a page. @returns The slots. */
   fill(page: number, count: number): readonly number[] {
     const slots: number[] = [];
     for (let k = 0; k < count; k++) {
@@ -55,7 +55,7 @@ export class PageSlots {
     return slots;
   }
 
-  /** Takes a page out of its slots. @returns them */
+  /** Removes a page from its slots. @returns The slots. */
   clear(page: number): readonly number[] {
     const slots = this.of(page);
     for (let k = slots.length - 1; k >= 0; k--) {

@@ -6,31 +6,34 @@ import type { CodedFile } from './page-coding.js';
 import { listPages, type PageList } from './page-list.js';
 import { chunkLayout, type SlotWords } from './slot-words.js';
 
-/** What is known of a streamed scene before any page of it has come. */
+/** Properties of a streamed scene, known before any page is loaded. */
 export type StreamedScene = PageFormat &
   Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'order' | 'origin' | 'bounds'>;
 
-/** A streamed scene, and where its pages come from. */
+/** A streamed scene, and the source of its pages. */
 export interface PageSource {
   readonly scene: StreamedScene;
   readonly list: PageList;
   /**
-   * Brings a page: for each slot of it in turn where its words lie, all slots but the last full. Rejects for one that cannot be had, or has not as many
-   * chunks as {@link list} says.
+   * Fetches a page: returns the words of each of its slots, all full but the last. Rejects if it is unavailable, or its
+   * number of chunks differs from {@link list}.
    */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<readonly SlotWords[]>;
-  /** True for a page that need not be fetched: it is placed before others that are needed as much. */
+  /** Whether a page need not be fetched: it then precedes others with the same need. */
   readonly isCached?: (page: number) => boolean;
-  /** World units by which a page stands elsewhere than its words say. Default: none. */
+  /** Translation of a page in world units. Default: none. */
   readonly translate?: (page: number) => Vector3;
 }
 
-/** Bytes of files that are kept: what is below a page is often wished for as soon as the page is there, and lies in the same file. */
+/**
+ * Bytes of cached files: the children of a page are often requested as soon as the page is resident, and lie in the
+ * same file.
+ */
 const KEPT_BYTES = 64e6;
 
 /**
- * Brings a file of pages.
- * @param coded what {@link decodePage} needs to know of it; undefined where files are not coded
+ * Fetches a file of pages.
+ * @param coded Parameters for {@link decodePage}; undefined if files are not coded.
  */
 export type FetchPage = (
   file: string,
@@ -39,8 +42,9 @@ export type FetchPage = (
 ) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>;
 
 /**
- * The pages of a folder that `gaussian-splat detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again.
- * @param isDecoded whether `fetchPage` decodes files that are coded
+ * Returns the page source of a folder that the command `stream` wrote. A file of the wrong length is not cached: the
+ * next request fetches it again.
+ * @param isDecoded Whether `fetchPage` decodes coded files.
  */
 export function folderSource(manifest: DetailManifest, fetchPage: FetchPage, isDecoded = false): PageSource {
   const list = listPages(manifest);
@@ -78,7 +82,7 @@ export function folderSource(manifest: DetailManifest, fetchPage: FetchPage, isD
 const loadDecoder = (): Promise<typeof decoder> =>
   loadModule('the code that decodes pages', () => import('./decode-page.js'));
 
-/** The bytes of a file in a buffer of their own, whatever view of one they came in. */
+/** The bytes of a file in a buffer of their own, for any kind of view. */
 function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBufferView<ArrayBuffer>): ArrayBuffer {
   if (bytes.byteLength === length) return ArrayBuffer.isView(bytes) ? bufferOf(bytes) : bytes;
   throw new GaussianSplatError('decode/truncated', {
@@ -89,7 +93,7 @@ function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBuff
   });
 }
 
-/** Of splats without bounds none is ever drawn: such a page is an error, as a file of them is. */
+/** Splats without finite bounds are never drawn: such a page is an error, as is a file with only such splats. */
 function requireBounds(where: string, bounds: Float32Array): void {
   if (bounds.every((number) => Number.isFinite(number))) return;
   throw new GaussianSplatError('decode/corrupt', {

@@ -2,44 +2,50 @@ import { BackOff } from '@gaussian-splat/core/fetch';
 import { NONE } from './page-list.js';
 import type { Residency } from './residency.js';
 
-/** Pages being fetched at a time; a file holds up to five. */
+/** Maximum number of concurrent fetches; a file holds up to five pages. */
 export const MOST_FETCHES = 64;
-/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 31 MB of the page's memory, and one page of any size; where they lie in files with others, these files. */
+/**
+ * Upper limit of the slots of pages in transit or waiting for their upload: at most 31 MB of CPU memory, plus one page
+ * of any size; more if they share files with others.
+ */
 export const MOST_UNDER_WAY = 240;
-/** How much a page counts in the mean time of arrival when the next one has come. */
+/** Weight of the previous mean arrival time when a new page arrives. */
 const MEMORY = 0.95;
-/** Milliseconds before a page that did not come is asked for again; twice as long after each further failure, and after so many no more. */
+/**
+ * Milliseconds before a failed page is requested again, doubled after each further failure, and the maximum number of
+ * attempts.
+ */
 const RETRY_MS = 4_000;
 const MOST_TRIES = 8;
-/** Milliseconds after a failure before those are tried again that had no room beside it: of many failures once. */
+/** Milliseconds after a failure before pages that did not fit beside it are tried again, once for many failures. */
 const ANEW_MS = 250;
 
-/** A page that has come. */
+/** A fetched page. */
 export interface FetchedPage<Words> {
   readonly page: number;
   readonly words: Words;
 }
 
 export interface TrafficOptions<Words> {
-  /** Rejects for a page that cannot be had. */
+  /** Rejects if the page is unavailable. */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<Words>;
-  /** A page waits for its upload. */
+  /** Called when a page waits for its upload. */
   readonly onArrival: () => void;
   readonly onError: (error: unknown) => void;
-  /** Milliseconds since any moment. Default: `performance.now`. */
+  /** Milliseconds from any origin. Default: `performance.now`. */
   readonly now?: () => number;
 }
 
 /**
- * Pages on their way from the server to a slot: the most needed are sent for first and handed over first, a bounded number is under way, and what nobody wishes for any
- * more is given up wherever it is.
+ * Streams pages from the server to slots: the most needed are fetched and uploaded first, a bounded number is in
+ * transit, and pages that are no longer requested are canceled at any stage.
  */
 export class PageTraffic<Words> {
   readonly #residency: Residency;
   readonly #options: TrafficOptions<Words>;
   readonly #fetching = new Map<number, AbortController>();
   readonly #waiting = new Map<number, Words>();
-  /** Those that wait and are wished for, the most needed last; undefined if that has to be found anew. */
+  /** Waiting and requested pages, the most needed last; undefined if the list is stale. */
   #order: number[] | undefined;
   readonly #failures: BackOff<number>;
   #retry: ReturnType<typeof setTimeout> | undefined;
@@ -58,27 +64,30 @@ export class PageTraffic<Words> {
     this.#failures = new BackOff({ firstMs: RETRY_MS, factor: 2, mostTries: MOST_TRIES, now: options.now });
   }
 
-  /** Pages being fetched or waiting. */
+  /** Number of pages being fetched or waiting. */
   get underWay(): number {
     return this.#fetching.size + this.#waiting.size;
   }
 
-  /** Pages that wait for their upload. */
+  /** Number of pages that wait for their upload. */
   get waiting(): number {
     return this.#waiting.size;
   }
 
-  /** Pages sent for that were given up since, because nobody wished for them any more or nothing could leave for them. */
+  /**
+   * Number of fetched pages that were canceled, because they were no longer requested or no page could be evicted for
+   * them.
+   */
   get abandoned(): number {
     return this.#abandoned;
   }
 
-  /** Milliseconds from when a page is sent for until it is handed over, as a mean of the last ones; 0 before any has been. */
+  /** Mean milliseconds of the latest pages from their request to their upload; 0 before the first. */
   get arrivalMs(): number {
     return this.#arrivalMs;
   }
 
-  /** To be called after each look: gives up what the last looks do not wish for and sends for what they do. */
+  /** Call after each feedback pass: cancels pages that are no longer requested, and fetches new ones. */
   follow(): void {
     this.#order = undefined;
     for (const page of [...this.#fetching.keys(), ...this.#waiting.keys()]) {
@@ -87,7 +96,7 @@ export class PageTraffic<Words> {
     this.sendForMore();
   }
 
-  /** Sends for the pages that are needed most, as many as may be under way. */
+  /** Fetches the most needed pages, up to the limits. */
   sendForMore(): void {
     while (!this.#isClosed && this.#fetching.size < MOST_FETCHES && this.#slotsUnderWay < MOST_UNDER_WAY) {
       const page = this.#residency.nextMissing();
@@ -96,7 +105,7 @@ export class PageTraffic<Words> {
     }
   }
 
-  /** Hands over the most needed of the pages that wait; undefined if the last look wishes for none of them. */
+  /** Returns the most needed of the waiting pages; undefined if none is requested. */
   next(): FetchedPage<Words> | undefined {
     const most = this.#nextWaiting();
     if (most === undefined) return undefined;
@@ -107,12 +116,12 @@ export class PageTraffic<Words> {
     return { page: most, words };
   }
 
-  /** A page that was handed over has found no slot. */
+  /** Call if the returned page found no slot. */
   refused(): void {
     this.#abandoned++;
   }
 
-  /** Ends everything; nothing is reported any more. */
+  /** Stops everything; no more callbacks follow. */
   close(): void {
     this.#isClosed = true;
     clearTimeout(this.#retry);
@@ -131,14 +140,14 @@ export class PageTraffic<Words> {
   #noteFailure(page: number, error: unknown): void {
     if (this.#failures.fail(page) === 1) this.#options.onError(error);
     this.#retryLater();
-    // The room that was kept for it is for others.
+    // The reserved slots are available to other pages.
     this.#anew ??= setTimeout(() => {
       this.#anew = undefined;
       this.#askAnew();
     }, ANEW_MS);
   }
 
-  /** A view at rest makes no look: what the last one wished for is asked for again all the same. */
+  /** A view at rest runs no feedback pass, so the last requests are repeated. */
   #retryLater(): void {
     this.#retry ??= setTimeout(() => {
       this.#retry = undefined;
@@ -148,7 +157,7 @@ export class PageTraffic<Words> {
     }, RETRY_MS);
   }
 
-  /** Sends for what the last look wished for, whatever has been tried since. */
+  /** Repeats all requests of the last feedback pass, including failed ones. */
   #askAnew(): void {
     this.#residency.rebuildMissing();
     this.sendForMore();
@@ -175,7 +184,7 @@ export class PageTraffic<Words> {
     this.#fetching.set(page, controller);
     this.#sentAt.set(page, this.#now());
     this.#slotsUnderWay += this.#residency.slotsFor(page);
-    // A page that was given up may have been sent for again meanwhile: that is another fetch.
+    // A canceled page may have been requested again meanwhile: that is another fetch.
     const isOver = (): boolean => this.#fetching.get(page) !== controller;
     try {
       const words = await this.#options.fetch(page, controller.signal);
@@ -192,7 +201,7 @@ export class PageTraffic<Words> {
     }
     this.#fetching.delete(page);
     this.sendForMore();
-    // Of a page that does not come there is nothing to draw.
+    // A failed page has nothing to draw.
     if (this.#waiting.has(page)) this.#options.onArrival();
   }
 }

@@ -6,12 +6,12 @@ import { PageRows } from './page-rows.js';
 import type { Residency } from './residency.js';
 import { chunkLayout, numbersOf, type ChunkLayout, type SlotWords } from './slot-words.js';
 
-/** The detail rows of all slots, page by page: which chunks are drawn, and in which share, while pages come and go. */
+/** LOD rows of all slots, page by page, which determine the weight of each chunk as pages arrive and are evicted. */
 export class PlacedRows {
   readonly #list: PageList;
   readonly #residency: Residency;
   readonly #table: DetailTable;
-  /** Of each slot. */
+  /** Rows of each slot. */
   readonly #rows: readonly PageRows[];
   readonly #layout: ChunkLayout;
 
@@ -25,9 +25,9 @@ export class PlacedRows {
   }
 
   /**
-   * Takes over what a page says of its chunks. Nothing below it is there, and it has not arrived at all.
-   * @param parts words of each slot that holds chunks
-   * @param by world units, added to all positions
+   * Sets the rows of a page. None of its children is resident, and its fade-in has not started.
+   * @param parts Words of each slot that holds chunks.
+   * @param by World units, added to all positions.
    */
   load(page: number, parts: readonly SlotWords[], by: Vector3): void {
     const { upper, parent, parentChunk } = this.#list;
@@ -45,14 +45,14 @@ export class PlacedRows {
     });
   }
 
-  /** How far, 0 to `ARRIVED`, a page has arrived: so far the chunks above give way to it. */
+  /** Sets the fade-in, 0 to `ARRIVED`, of a page, which replaces its parent chunks to that degree. */
   setArrived(page: number, arrived: number): void {
     if (this.#list.slots[page] === 1) this.#setSlot(this.#residency.slotOf[page], arrived);
     else for (const slot of this.#residency.slotsOf(page)) this.#setSlot(slot, arrived);
     this.#setBelow(page, arrived);
   }
 
-  /** A page has left: the chunks above are drawn again, and nothing is that its slots held. */
+  /** Removes an evicted page: its parent chunks are drawn again, and its slots are empty. */
   leave(page: number, slots: readonly number[]): void {
     for (const slot of slots) {
       this.#rows[slot].clear();
@@ -61,7 +61,7 @@ export class PlacedRows {
     this.#setBelow(page, 0);
   }
 
-  /** Hands over what has changed: see `DetailTable.flush`. */
+  /** Writes the changes: see `LodTable.flush`. */
   flush(slotsPerBuffer: number, write: (slot: number, rows: Float32Array<ArrayBuffer>) => void): void {
     this.#table.flush(slotsPerBuffer, write);
   }

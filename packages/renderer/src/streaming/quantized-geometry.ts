@@ -2,8 +2,10 @@ import { constants, layouts } from '../generated/shaders.js';
 import { FACTOR_NUMBERS, type SplatLevel } from '../levels/splat-level.js';
 
 /**
- * Geometry of a chunk in half of the bytes: 16 a splat and 32 a chunk, as shaders/shared/quantized_gaussian.wgsl reads it. Centres are kept to 1/131,070 of the chunk's box, lengths of the
- * factor's rows (standard deviations along x, y and z) to 1/2046 of the octaves between the chunk's least and largest, directions of its rows to some 0.0004, opacities to 1/3000.
+ * Geometry of a chunk in half the bytes: 16 for each splat and 32 for each chunk, in the layout of
+ * shaders/shared/quantized_gaussian.wgsl. Centers are stored to 1/131,070 of the chunk's box, lengths of the factor's
+ * rows (standard deviations along x, y and z) to 1/2046 of the octaves between the chunk's smallest and largest,
+ * directions of its rows to about 0.0004, opacities to 1/3000.
  */
 
 const {
@@ -22,29 +24,29 @@ export const ROW_CODES = 10;
 /** 32-bit words of a chunk. */
 export const QUANTIZED_CHUNK_WORDS = 4 * QUANTIZED_CHUNK_ROWS;
 const CENTER_STEPS = 65535;
-/** Twice the most that rounding moves a centre by, as a part of the diagonal of its chunk's box. */
+/** Twice the maximum rounding error of a center, as a fraction of the diagonal of its chunk's box. */
 export const CENTER_ROUNDING = 1 / CENTER_STEPS;
 const MOST_OPACITY = 4095;
-/** The first opacity that is drawn. */
+/** The lowest visible opacity code. */
 const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);
-/** Octaves below the largest row of a chunk: what is smaller shows nowhere beside it. */
+/** Octaves below the largest row of a chunk: anything smaller is invisible beside it. */
 const MOST_OCTAVES = 24;
 
-/** By how much a splat reaches farther at most, its size being rounded; so is its opacity, where that is too little to be seen. */
+/** Factor of the reach for the rounding of sizes, and of opacities that are barely visible. */
 const FARTHER = 1.02;
 const REACH = layouts.Chunk.fields.reach.offset / 4;
 
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
-/** The least float32 that is not below a number, which is 0 or more. */
+/** Smallest float32 that is at least the given non-negative number. */
 function roundedUp(value: number): number {
   float[0] = value;
   if (float[0] < value) bits[0]++;
   return float[0];
 }
 
-/** The nearest code, 0 for what is below `least`. */
+/** The nearest code, 0 for values below `least`. */
 const codeOf = (value: number, least: number, step: number, most: number): number =>
   step > 0 ? Math.min(most, Math.max(0, Math.round((value - least) / step))) : 0;
 
@@ -55,7 +57,7 @@ export function rowLengths(factors: Float32Array, f: number, lengths: Float64Arr
   lengths[2] = Math.hypot(factors[f + 3], factors[f + 4], factors[f + 5]);
 }
 
-/** Log2 of the least and of the largest row of some splats, at most {@link MOST_OCTAVES} apart. */
+/** log2 of the smallest and of the largest row of some splats, at most {@link MOST_OCTAVES} apart. */
 function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly [least: number, largest: number] {
   const lengths = new Float64Array(3);
   let [least, largest] = [Infinity, 0];
@@ -69,8 +71,8 @@ function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly
 }
 
 /**
- * Writes splats `from` to `end` of a level as one chunk, from word `at` on. What fills it up has opacity 0.
- * @param words all zeros there
+ * Writes splats `from` to `end` of a level as one chunk, from word `at` on. The padding has opacity 0.
+ * @param words Must be zero there.
  */
 export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: number, from: number, end: number): void {
   if (end - from > CULL_GROUP) throw new RangeError(`expected at most ${CULL_GROUP} splats, found ${end - from}`);
@@ -97,7 +99,7 @@ export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: nu
     const f = FACTOR_NUMBERS * i;
     rowLengths(factors, f, lengths);
     const size = (row: number): number => code(3, Math.log2(lengths[row]), QUANTIZED_SIZES);
-    // L Lᵀ is the same with a column's sign turned, so no number of the diagonal need be negative.
+    // L Lᵀ does not change with the sign of a column, so the diagonal is made non-negative.
     const [first, second] = [factors[f] < 0 ? -1 : 1, factors[f + 2] < 0 ? -1 : 1];
     const t = directionIn2(first * factors[f + 1], factors[f + 2]);
     const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
@@ -116,7 +118,7 @@ export function putRow(words: Uint32Array, row: number, codes: Int32Array): void
   words[row + 3] = codes[8] | (codes[9] << 13) | ((t >>> 5) << 25);
 }
 
-/** Reads what {@link putRow} wrote. */
+/** Reads the codes of {@link putRow}. */
 export function readRow(words: Uint32Array, row: number, codes: Int32Array): void {
   const [a, b, c, d] = [words[row], words[row + 1], words[row + 2], words[row + 3]];
   codes[0] = a & 0xffff;
@@ -131,25 +133,28 @@ export function readRow(words: Uint32Array, row: number, codes: Int32Array): voi
   codes[9] = (d >>> 13) & 0xfff;
 }
 
-/** Makes the bounds of a chunk, which begin at number `at`, those of its quantized splats. */
+/** Widens the bounds of a chunk at number `at` to those of its quantized splats. */
 export function widenReach(bounds: Float32Array, at: number): void {
   bounds[at + REACH] *= FARTHER;
 }
 
-/** On the same side of 1/255 as the opacity: splats below it are not drawn. */
+/** On the same side of 1/255 as the opacity, because splats below it are not drawn. */
 function opacityCode(opacity: number): number {
   const nearest = Math.min(MOST_OPACITY, Math.max(0, Math.round(opacity * QUANTIZED_OPAQUE)));
   return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
 }
 
-/** The direction of (x, |y|): where it meets the line |x| + y = 1. */
+/** Direction of (x, |y|): its intersection with the line |x| + y = 1. */
 export function directionIn2(x: number, y: number): number {
   const sum = Math.abs(x) + Math.abs(y);
   if (!(sum > 0)) return QUANTIZED_T_ZERO;
   return QUANTIZED_T_ZERO + Math.round((QUANTIZED_T_ZERO * x) / sum);
 }
 
-/** The direction of (x, y, |z|): the octahedral map of the half sphere, turned by 45° so that it fills a square (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors"). */
+/**
+ * Direction of (x, y, |z|): the octahedral map of the hemisphere, rotated by 45° so that it fills a square (Cigolle et
+ * al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors").
+ */
 export function directionIn3(x: number, y: number, z: number): readonly [u: number, v: number] {
   const sum = Math.abs(x) + Math.abs(y) + Math.abs(z);
   if (!(sum > 0)) return [QUANTIZED_UV_ZERO, QUANTIZED_UV_ZERO];

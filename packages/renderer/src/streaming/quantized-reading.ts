@@ -1,7 +1,7 @@
 import { cullQuantized, cullSerialQuantized, projectQuantized } from '../generated/quantized-shaders.js';
 import type { GeometryReading } from '../geometry-reading.js';
 
-/** Reads what {@link packQuantizedChunk} of quantized-geometry.ts writes. */
+/** Shaders that read the chunks of {@link packQuantizedChunk}. */
 export const QUANTIZED: GeometryReading = {
   cull: cullQuantized,
   cullSerial: cullSerialQuantized,

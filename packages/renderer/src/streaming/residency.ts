@@ -2,47 +2,54 @@ import { RankedHeap } from '../ranked-heap.js';
 import { largerThan, NONE, type PageList } from './page-list.js';
 import { PageSlots, type Settled } from './page-slots.js';
 
-/** How much more pixels a page must save than one that has to leave for it, both being wished for. */
+/** A requested page must be more needed, by this factor, than a requested page that is evicted for it. */
 const WORTH = 1.5;
-/** How many times sooner than by its need a page is sent for that need not be fetched. */
+/** Factor of the need of a page that is cached. */
 const AT_HAND = 4;
-/** Looks in a row that must not wish for a page on its way before it is given up: views that look in turn wish for different pages. */
+/**
+ * Feedback passes in a row that must not request a page in transit before it is canceled, because alternating views
+ * request different pages.
+ */
 const STALE_AFTER = 2;
 
 /**
- * Which pages are in which slots, and which should come and go. The chunks above a page are there as long as the page is: pages come from the coarse to the fine
- * and leave from the fine to the coarse, so that what is there always covers the scene. A page is there in all of its slots or not at all; one that has no room beside
- * all that is above it never comes.
+ * Decides which pages are resident, fetched and evicted. The ancestors of a resident page are always resident: pages
+ * arrive from coarse to fine and are evicted from fine to coarse, so that the resident pages always cover the scene. A
+ * page is resident in all of its slots or not at all; one that does not fit together with its ancestors is never
+ * fetched.
  *
- * A look costs time linear in the pages, a page that comes or goes the logarithm of it.
+ * A feedback pass costs time linear in the pages, the arrival or eviction of a page its logarithm.
  */
 export class Residency {
   readonly #slots: PageSlots;
   readonly #list: PageList;
   readonly #isCached: (page: number) => boolean;
-  /** [P] pixels that doing without a page would cost, when last looked, and at which look it was last wished for. */
+  /**
+   * [P] screen error of a missing page in pixels, from the last feedback pass, and the index of the last pass that
+   * requested it.
+   */
   readonly #request: Float32Array;
   readonly #requestedAt: Uint32Array;
-  /** [P] pages below a page that are there or on their way. */
+  /** [P] descendants of a page that are resident or in transit. */
   readonly #below: Uint32Array;
-  /** [P] 1 for those that have no room beside all that is above them. */
+  /** [P] 1 for pages that do not fit together with their ancestors. */
   readonly #isTooLarge: Uint8Array;
   readonly #coming = new Set<number>();
   readonly #missing: RankedHeap;
-  /** Pages that may leave, those that can best be spared first. */
+  /** Evictable pages, least needed first. */
   readonly #evictees: RankedHeap;
-  /** [P] 1 for those that are among the leavers or set aside. */
+  /** [P] 1 for pages that are listed as evictable or reserved for eviction. */
   readonly #isListed: Uint8Array;
-  /** Pages that will leave for those on their way that find no empty slot, in the order in which they will; drawn until then. */
+  /** Pages reserved for eviction by pages in transit without empty slots, in order; drawn until then. */
   #reserved: number[] = [];
-  /** Slots of those, and of pages on their way. */
+  /** Number of their slots, and of the slots of pages in transit. */
   #slotsAside = 0;
   #slotsComing = 0;
-  /** The last look has found no room for a page of so many slots that was needed so much. */
+  /** Size and need of a page that did not fit since the last feedback pass. */
   #noRoom = { slots: Infinity, need: 0 };
   #sample = 0;
 
-  /** @param isCached true for a page that need not be fetched */
+  /** @param isAtHand Whether a page is cached and need not be fetched. */
   constructor(list: PageList, slots: number, isCached: (page: number) => boolean = () => false) {
     this.#list = list;
     this.#isCached = isCached;
@@ -70,32 +77,32 @@ export class Residency {
     return this.slotOf[page] !== NONE;
   }
 
-  /** Slots of a page that is there, in the order of its chunks; none of another. */
+  /** Slots of a resident page, in the order of its chunks; empty for others. */
   slotsOf(page: number): readonly number[] {
     return this.#slots.of(page);
   }
 
-  /** Slots that a page takes. */
+  /** Number of slots of a page. */
   slotsFor(page: number): number {
     return this.#list.slots[page];
   }
 
-  /** Pages that are there. */
+  /** Number of resident pages. */
   get residents(): number {
     return this.#slots.count;
   }
 
-  /** Pixels that doing without a page would cost, as of the last look; 0 if that does not wish for it. */
+  /** Screen error of a missing page in pixels, from the last feedback pass; 0 if it is not requested. */
   need(page: number): number {
     return this.#request[page];
   }
 
-  /** True for a page that the last looks have not wished for. */
+  /** Whether the last feedback passes have not requested the page. */
   isStale(page: number): boolean {
     return this.#sample - this.#requestedAt[page] >= STALE_AFTER;
   }
 
-  /** Takes note of a look: for each page the pixels that doing without it would cost, 0 for those that nobody wishes for. */
+  /** Records a feedback pass: for each page the screen error in pixels if it is missing, 0 if it is not requested. */
   note(requests: Float32Array): void {
     this.#sample++;
     this.#noRoom = { slots: Infinity, need: 0 };
@@ -108,11 +115,12 @@ export class Residency {
   }
 
   /**
-   * Takes the most needed page from those that the last look wishes for and that are neither there nor on their way, though what is above them is.
-   * @returns {@link NONE} if there is none
+   * Removes and returns the most needed of the requested pages that are neither resident nor in transit, but have a
+   * resident parent.
+   * @returns {@link NONE} if there is none.
    */
   nextMissing(): number {
-    // Thousands may find no room: none is tried that is needed no more, and takes no less, than one that has found none.
+    // Thousands may not fit: skips pages that are at most as needed, and at least as large, as one that did not.
     const { slots, need } = this.#noRoom;
     while (slots > 1 || this.#missing.largest > need) {
       const page = this.#missing.pop();
@@ -123,13 +131,16 @@ export class Residency {
     return NONE;
   }
 
-  /** Lets {@link nextMissing} name again all that the last look wishes for and that is missing, whatever has found no room. */
+  /** Lets {@link nextMissing} return all requested missing pages again, even those that did not fit. */
   rebuildMissing(): void {
     this.#noRoom = { slots: Infinity, need: 0 };
     this.#listMissing();
   }
 
-  /** Starts bringing a page if there is room for it, or something to leave that is needed less; if not, nothing as large that is needed no more is missing until the next look. */
+  /**
+   * Reserves slots for a page, empty ones or those of less needed pages; if there are none, equally large pages with at
+   * most the same need are skipped until the next feedback pass.
+   */
   begin(page: number): boolean {
     const parent = this.#list.parent[page];
     if (parent !== NONE) this.#hold(parent);
@@ -143,7 +154,7 @@ export class Residency {
     return true;
   }
 
-  /** A page that was on its way does not come. */
+  /** Cancels a page in transit. */
   cancel(page: number): void {
     if (!this.#coming.delete(page)) return;
     this.#slotsComing -= this.#list.slots[page];
@@ -156,7 +167,7 @@ export class Residency {
     }
   }
 
-  /** A page has come. @returns its slots and the pages that left for it; undefined if there is no room any more. */
+  /** Makes a page resident. @returns Its slots and the pages that were evicted for it; undefined if it no longer fits. */
   settle(page: number): Settled | undefined {
     const evictees = this.#evicteesFor(page);
     if (evictees === undefined) {
@@ -175,7 +186,7 @@ export class Residency {
     return { slots, left };
   }
 
-  /** Slots that pages on their way will need and not find empty. */
+  /** Slots that pages in transit need beyond the empty ones. */
   get #lackingSlots(): number {
     return Math.max(0, this.#slotsComing - this.#slots.empty);
   }
@@ -219,18 +230,18 @@ export class Residency {
     }
   }
 
-  /** Never the coarsest page, nor one that has anything below it. */
+  /** The coarsest page, and pages with resident descendants, are never evicted. */
   #isEvictable(page: number): boolean {
     return this.isResident(page) && this.#below[page] === 0 && this.#list.parent[page] !== NONE;
   }
 
-  /** How well a page can be spared: best one not wished for the longest; of those wished for the least needed. */
+  /** Eviction priority: first the page not requested for the longest time; among requested ones the least needed. */
   #evictionPriority(page: number): number {
     const age = this.#sample - this.#requestedAt[page];
     return age > 0 ? age : -this.#request[page];
   }
 
-  /** Puts a page among those that may leave, if it may. */
+  /** Lists a page as evictable, if it is. */
   #offer(page: number): void {
     if (this.#isListed[page] === 1 || !this.#isEvictable(page)) return;
     this.#isListed[page] = 1;
@@ -242,7 +253,7 @@ export class Residency {
     this.#offer(page);
   }
 
-  /** Takes the page that can best be spared; it counts as listed until it has left or is returned. */
+  /** Removes the first evictable page; it counts as listed until it is evicted or returned. */
   #nextEvictable(): number {
     for (let page = this.#evictees.pop(); page !== NONE; page = this.#evictees.pop()) {
       if (this.#isEvictable(page)) return page;
@@ -256,7 +267,7 @@ export class Residency {
     this.#slotsAside += this.#list.slots[page];
   }
 
-  /** Returns what was set aside last. */
+  /** Returns the last reserved page to the list. */
   #putBack(): void {
     const page = this.#reserved.pop()!;
     this.#slotsAside -= this.#list.slots[page];
@@ -267,7 +278,7 @@ export class Residency {
     return this.#requestedAt[evictee] !== this.#sample || WORTH * this.#request[evictee] < this.#request[page];
   }
 
-  /** Sees to slots for one page more than are on their way. */
+  /** Reserves slots for one more page in transit. */
   #makeRoom(page: number): boolean {
     const lacking = this.#slotsComing + this.#list.slots[page] - this.#slots.empty;
     const before = this.#reserved.length;
@@ -284,7 +295,7 @@ export class Residency {
     return true;
   }
 
-  /** The pages that leave for one that has come; undefined if too few are needed so much less. */
+  /** The pages to evict for a new one; undefined if too few are sufficiently less needed. */
   #evicteesFor(page: number): number[] | undefined {
     const evictees: number[] = [];
     for (let room = this.#slots.empty; room < this.#list.slots[page];) {
@@ -301,7 +312,7 @@ export class Residency {
     return evictees;
   }
 
-  /** Something below a page is on its way: it must stay. */
+  /** A descendant is in transit, so the page must stay. */
   #hold(page: number): void {
     this.#below[page]++;
     const at = this.#reserved.indexOf(page);
@@ -311,7 +322,7 @@ export class Residency {
     this.#isListed[page] = 0;
   }
 
-  /** Something below a page has left or does not come. */
+  /** A descendant was evicted or canceled. */
   #release(page: number): void {
     this.#below[page]--;
     this.#offer(page);

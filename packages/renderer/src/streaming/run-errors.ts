@@ -1,8 +1,14 @@
-/** Splats whose nearest neighbour is looked for, and among how many before and behind them in the order. */
+/**
+ * Number of splats whose nearest neighbor is searched, and the number of splats before and after them in the order to
+ * search.
+ */
 const SAMPLE = 128;
 const REACH = 512;
 
-/** Width of the cells that the splats of a surface have each to itself: scattered at random, twice the distance of nearest neighbours. Their median. */
+/**
+ * Side of the cell that each splat of a surface occupies on median: twice the distance of nearest neighbors for
+ * randomly scattered splats.
+ */
 export function spacingOf(positions: Float32Array, kept: Uint32Array): number {
   const count = Math.min(SAMPLE, kept.length);
   const distances = Float64Array.from({ length: count }, (_, s) => {
@@ -25,15 +31,15 @@ function squaredDistance(positions: Float32Array, p: number, q: number): number 
 }
 
 /**
- * Twice the root mean square of how far points of a surface are from the nearest of splats scattered over it, 2 √(1/π) for cells 1 wide, and as much again (in squares)
- * for the shape of a splat that is as wide as its cell.
+ * Twice the root mean square distance between points of a surface and the nearest splat scattered over it, 2 √(1/π) for
+ * cells of side 1, and as much again (in squares) for a splat as wide as its cell.
  */
 const CELL_ERROR = 1.6;
 
 /**
- * How far the levels of a node displace what they show, world units: the file does not say, so it is taken from how far apart their splats are, and those of the
- * finest. Grows from level to level.
- * @param spacings of each level (see {@link spacingOf}), the finest first, world units
+ * Estimates the errors of the levels of a node in world units from the spacing of their splats and of the finest,
+ * because the file does not state them. They increase from level to level.
+ * @param spacings Of each level (see {@link spacingOf}), finest first, world units.
  */
 export function errorsOfSpacings(spacings: readonly number[]): number[] {
   const errors: number[] = [];

@@ -7,12 +7,12 @@ import { moveQuantizedSlots } from '../generated/quantized-shaders.js';
 import { moveSlots } from '../generated/streamed-shaders.js';
 import { Stage } from '../stages/stage.js';
 
-/** Slots that are moved in one submission. */
+/** Slots translated in one submission. */
 const MOST_MOVES = 256;
 const MOVE_WORDS = layouts.SlotMove.size / 4;
 const { by: BY, slot: SLOT } = layouts.SlotMove.fields;
 
-/** Moves what was written into slots, on the GPU: reading and writing it on the page's thread would cost that as much as the upload. */
+/** Translates the content of slots on the GPU: on the main thread it would cost as much as the upload. */
 export class SlotMover {
   readonly #device: GPUDevice;
   readonly #stage: Stage<typeof moveSlots | typeof moveQuantizedSlots>;
@@ -36,27 +36,27 @@ export class SlotMover {
     });
   }
 
-  /** Nothing is to be moved. */
+  /** Whether no translation is pending. */
   get isEmpty(): boolean {
     return this.#pending.size === 0;
   }
 
-  /** No other slot must be noted before {@link record}. */
+  /** Whether {@link record} must be called before another slot. */
   get isFull(): boolean {
     return this.#pending.size === MOST_MOVES;
   }
 
-  /** What is in a slot is about to be overwritten. */
+  /** Discards the translation of a slot that is about to be overwritten. */
   forget(slot: number): void {
     this.#pending.delete(slot);
   }
 
-  /** A slot has been filled, with what belongs elsewhere by so much. */
+  /** Adds the translation of a slot that was filled. */
   note(slot: number, by: Vector3): void {
     if (by.some((value) => value !== 0)) this.#pending.set(slot, by);
   }
 
-  /** Records the moves of what has been noted, to be submitted before anything else is noted. */
+  /** Records the pending translations, to be submitted before others are added. */
   record(encoder: GPUCommandEncoder): void {
     if (this.isEmpty) return;
     const pass = encoder.beginComputePass({ label: 'gs.pool.move' });

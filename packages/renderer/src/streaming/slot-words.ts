@@ -2,12 +2,12 @@ import { constants } from '../generated/shaders.js';
 import type { Vector3 } from '@gaussian-splat/core';
 import { pageLayout, type PageFormat } from './manifest.js';
 
-/** Where the words of the chunks of a slot lie: in a file that other pages share, and that nobody may change. */
+/** Location of the words of a slot's chunks: a read-only file that other pages share. */
 export interface SlotWords {
-  /** Laid out as docs/lod-format.md describes a file of {@link of} chunks. */
+  /** In the layout of docs/lod-format.md for a file of {@link of} chunks. */
   readonly words: Uint32Array<ArrayBuffer>;
   readonly of: number;
-  /** The first of the slot's chunks in it, and how many there are. */
+  /** Index of the slot's first chunk in it, and the number of chunks. */
   readonly first: number;
   readonly chunks: number;
 }
@@ -16,25 +16,25 @@ type Part = 'chunks' | 'details' | 'geometry' | 'sh';
 
 const PARTS: readonly Part[] = ['chunks', 'details', 'geometry', 'sh'];
 
-/** Words of one chunk, part by part. */
+/** Words of one chunk, section by section. */
 export type ChunkLayout = ReturnType<typeof pageLayout>;
 
 export const chunkLayout = (format: PageFormat): ChunkLayout => pageLayout(format, 1);
 
-/** Where a part of a slot's words begins. */
+/** Start of a section of a slot's words. */
 export function startOf({ of, first }: SlotWords, part: Part, layout: ChunkLayout): number {
   let before = 0;
   for (let k = 0; PARTS[k] !== part; k++) before += layout[PARTS[k]];
   return of * before + first * layout[part];
 }
 
-/** A part of a slot's words, as numbers that nobody may change. */
+/** A section of a slot's words as read-only numbers. */
 export function numbersOf(slot: SlotWords, part: Part, layout: ChunkLayout): Float32Array<ArrayBuffer> {
   const { buffer, byteOffset } = slot.words;
   return new Float32Array(buffer, byteOffset + 4 * startOf(slot, part, layout), slot.chunks * layout[part]);
 }
 
-/** Words of a page that lie slot by slot, each laid out on its own, all but the last full. */
+/** Words of a page slot by slot, each with its own layout, all but the last full. */
 export function slotBySlot(words: Uint32Array<ArrayBuffer>, format: PageFormat): SlotWords[] {
   const [chunk, slot] = [pageLayout(format, 1).total, pageLayout(format, constants.SLOT_CHUNKS).total];
   return Array.from({ length: Math.ceil(words.length / slot) }, (_, k) => {
@@ -44,7 +44,10 @@ export function slotBySlot(words: Uint32Array<ArrayBuffer>, format: PageFormat):
   });
 }
 
-/** Moves the points that begin at every so many numbers, as shaders/move_slots.wgsl does: by float32. No array, no closure: hundreds of pages come in a frame. */
+/**
+ * Translates points at a stride, in float32 as shaders/move_slots.wgsl does. Allocates nothing, because hundreds of
+ * pages arrive in a frame.
+ */
 export function movePoints(numbers: Float32Array, first: number, end: number, stride: number, by: Vector3): void {
   const [x, y, z] = [Math.fround(by[0]), Math.fround(by[1]), Math.fround(by[2])];
   for (let at = first; at < end; at += stride) {

@@ -19,37 +19,48 @@ import { PageFeedback } from './page-feedback.js';
 import type { ShPrecision } from '../pack/words.js';
 
 export interface PoolOptions {
-  /** Bytes of GPU memory for resident splats, up to a 32nd of which uploads pass through, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
-  readonly memoryBudget?: number;
   /**
-   * Milliseconds in which a page that has come takes the place of what stood for it, in 16 frames at least; 0 for at once. Default 400.
+   * Bytes of GPU memory for resident splats, allocated at once, up to a 32nd for staging. Default 256 MB, or the size
+   * of the whole scene if that is less.
    */
+  readonly memoryBudget?: number;
+  /** Duration of the fade-in of a page over its parent in milliseconds, at least 16 frames; 0 for none. Default 400. */
   readonly arrivalMs?: number;
-  /** Gives the opening up: it rejects with the signal's reason, and holds no memory. Of no effect once the scene is there. */
+  /**
+   * Cancels the opening: it rejects with the reason of the signal, and holds no memory. Has no effect once the scene is
+   * open.
+   */
   readonly signal?: AbortSignal;
-  /** Called when another frame is asked for: a page has come, or what the last view lacks is not known yet. */
+  /** Called when another frame is required: a page has arrived, or the last view has no feedback pass yet. */
   readonly onChange?: () => void;
-  /** Called when a page does not come; what is above it stays visible. It is asked for again after 4 s, after further failures twice as long each, up to 256 s. */
+  /**
+   * Called when a page fails; its parent stays visible. It is requested again after 4 s, after each further failure
+   * twice as long, up to 256 s.
+   */
   readonly onError?: (error: unknown) => void;
 }
 
 export interface StreamOptions extends PoolOptions {
   /**
-   * Fetches a file of pages, named relative to the manifest; 64 at a time at most. Aborted when no view needs any of them any more, and when the scene is destroyed. Best done in a
-   * worker: reading a response costs a thread more than all else that a page needs.
+   * Fetches a file of pages, named relative to the manifest; at most 64 at a time. Aborted when no view needs any of
+   * its pages, and when the scene is destroyed. Best done in a worker: reading a response costs a thread more than all
+   * other work for a page.
    */
   readonly fetchPage: FetchPage;
-  /** Whether {@link fetchPage} decodes the files of a manifest that has a `coding`, by `decodePage` and what it receives of them. Default: they are decoded here. */
+  /**
+   * Whether {@link fetchPage} decodes the files of a manifest with a `coding`, by `decodePage`. Default: they are
+   * decoded here.
+   */
   readonly isDecoded?: boolean;
 }
 
 /** Fits a phone. */
 const DEFAULT_BUDGET = 256e6;
 
-/** Of pages that stand where their words say. */
+/** Translation of pages without one. */
 const IN_PLACE: Vector3 = [0, 0, 0];
 
-/** A page that has slots, and which of its parts are in them already. */
+/** A page with slots, and the progress of its upload. */
 interface Upload {
   readonly page: number;
   readonly slots: readonly number[];
@@ -71,20 +82,20 @@ function requireTime(arrivalMs: number): void {
 }
 
 /**
- * A scene of any size from static hosting, of which only those pages are on the GPU that the view asks for. The coarsest page is always
- * there; for a page that is missing, its coarser parent is drawn.
+ * A scene of any size from static hosting. Only the pages that the view needs are on the GPU. The coarsest page is
+ * always resident; the coarser parent of a missing page is drawn instead.
  *
- * Draw it with the setting `detail` above 0 or a `splatBudget`: without, every view asks for the finest pages.
+ * Draw it with the setting `lodError` above 0 or a `splatBudget`: without either, every view requests the finest pages.
  */
 export class StreamedGaussians implements GaussianScene {
-  /** Splats for which there is room. */
+  /** Capacity in splats. */
   readonly count: number;
   /** Splats of the finest level. */
   readonly leafCount: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   /** See `CloudHints.order`. */
   readonly order: 'pixel' | undefined;
@@ -92,7 +103,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly bounds: Bounds;
   readonly pages: readonly GaussianPage[];
   readonly detailBudget: DetailBudget;
-  /** Page requests of the views: for the renderer. */
+  /** Page requests of the views, for the renderer. */
   readonly pageRequests: PageFeedback;
   readonly #source: PageSource;
   readonly #options: PoolOptions;
@@ -167,17 +178,18 @@ export class StreamedGaussians implements GaussianScene {
 
   /**
    * Allocates the pool and fetches the coarsest page.
-   * @param manifest see `checkManifest`
-   * @throws GaussianSplatError `out-of-memory/*` if there is no room; what `fetchPage` throws, `decode/truncated` for a page of the wrong length; `argument/value` for an `arrivalMs` that
-   * is no time; the reason of `signal`.
+   * @param manifest See `checkManifest`.
+   * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; errors of `fetchPage`, `decode/truncated`
+   * for a page of the wrong length; `argument/value` for an invalid `arrivalMs`; the reason of `signal`.
    */
   static open(device: GPUDevice, manifest: DetailManifest, options: StreamOptions): Promise<StreamedGaussians> {
     return this.openSource(device, folderSource(manifest, options.fetchPage, options.isDecoded), options);
   }
 
   /**
-   * The same for pages from anywhere.
-   * @throws GaussianSplatError `out-of-memory/*` if there is no room; what the source throws for the first page; `argument/value` and the reason of `signal` as {@link open} does.
+   * The same for any page source.
+   * @throws GaussianSplatError `out-of-memory/*` if memory is insufficient; errors of the source for the first page;
+   * `argument/value` and the reason of `signal` as {@link open} does.
    */
   static async openSource(device: GPUDevice, source: PageSource, options: PoolOptions): Promise<StreamedGaussians> {
     const what = `streamed scene of ${source.scene.splats} splats`;
@@ -198,19 +210,20 @@ export class StreamedGaussians implements GaussianScene {
     }
   }
 
-  /** Grows with every page that comes. */
+  /** Incremented with every page that arrives. */
   get version(): number {
     return this.#version;
   }
 
-  /** Bytes of GPU memory held. */
+  /** Bytes of allocated GPU memory. */
   get byteLength(): number {
     return this.#memory.byteLength;
   }
 
   /**
-   * Pages on the GPU, all pages, and pages that are on their way or still taking the place of others. `error` tells by how many pixels places are off at most whose pages are not there, as of
-   * the last look (those out of view count a quarter near it, else a sixteenth): at rest, with nothing coming, what a larger `memoryBudget` would mend.
+   * Pages on the GPU, all pages, and pages in transit or fading in. `error` is the largest screen error in pixels from
+   * a missing page, from the last feedback pass (pages outside the view count a quarter near it, else a sixteenth). At
+   * rest, with nothing in transit, a larger `memoryBudget` would reduce it.
    */
   get progress(): {
     readonly resident: number;
@@ -226,14 +239,17 @@ export class StreamedGaussians implements GaussianScene {
     };
   }
 
-  /** For each slot of the pool the page in it, as pages are numbered through all files and instances of the manifest; undefined for an empty one. */
+  /**
+   * For each slot of the pool the index of its page, numbered through all files and instances of the manifest;
+   * undefined for an empty slot.
+   */
   get pagesInSlots(): readonly (number | undefined)[] {
     return Array.from(this.#residency.pageIn, (page) => (page === NONE ? undefined : page));
   }
 
   /**
-   * What has been done since the scene was opened: pages and bytes uploaded, milliseconds of the page's thread that it took, and pages that were sent for in vain, because
-   * the view had moved on.
+   * Totals since the scene was opened: uploaded pages and bytes, milliseconds of main-thread time, and pages that were
+   * fetched in vain because the view had moved on.
    */
   get traffic(): {
     readonly pages: number;
@@ -244,7 +260,7 @@ export class StreamedGaussians implements GaussianScene {
     return { ...this.#uploaded, abandoned: this.#traffic.abandoned };
   }
 
-  /** Uploads some of what has come, and lets what came before arrive further. The renderer calls it before each frame. */
+  /** Uploads some of the received pages and advances fades. The renderer calls it before each frame. */
   update(): void {
     const start = performance.now();
     if (this.#arrivals.step(start)) this.#version++;
@@ -263,12 +279,12 @@ export class StreamedGaussians implements GaussianScene {
     this.#memory.destroy();
   }
 
-  /** Pages that have slots, but do not cover what they should yet. */
+  /** Number of pages with slots that are not yet completely shown. */
   get #placing(): number {
     return (this.#upload ? 1 : 0) + this.#arrivals.count;
   }
 
-  /** Places the most needed of what waits: one slot, and as many more as so many bytes are enough for. */
+  /** Uploads the most needed waiting pages: one slot, and as many more as fit this number of bytes. */
   #uploadSome(most: number): void {
     const start = performance.now();
     let bytes = 0;
@@ -278,7 +294,7 @@ export class StreamedGaussians implements GaussianScene {
         if (next === undefined) break;
         if (!this.#begin(next.page, next.words)) {
           this.#traffic.refused();
-          // A page that finds no slot has cost its share of the thread as well.
+          // A page without a slot has used its part of the time budget as well.
           for (const { chunks } of next.words) bytes += this.#bytesOf(chunks);
           continue;
         }
@@ -288,7 +304,10 @@ export class StreamedGaussians implements GaussianScene {
     if (bytes > 0) this.#pace.note(bytes, performance.now() - start);
   }
 
-  /** Finds slots for a page; what leaves them gives way to what is above it with this frame. @returns false if there are none */
+  /**
+   * Finds slots for a page; evicted pages are replaced by their parents in this frame. @returns False if there are
+   * none.
+   */
   #begin(page: number, parts: readonly SlotWords[]): boolean {
     const place = this.#residency.settle(page);
     if (place === undefined) return false;
@@ -301,7 +320,7 @@ export class StreamedGaussians implements GaussianScene {
     return true;
   }
 
-  /** Uploads what belongs in one slot of a page. With the last of them the page takes part in the picture. @returns bytes */
+  /** Uploads one slot of a page. With its last slot the page becomes visible. @returns The number of bytes. */
   #writeSlot(upload: Upload): number {
     const { page, slots, parts, by } = upload;
     const words = parts[upload.written];

@@ -1,30 +1,40 @@
-/** Share of the time between two frames that placing pages may take of the page's thread: at first and at least, and at most. */
+/** Fraction of the frame interval for uploads on the main thread: initial value and minimum, and maximum. */
 export const UPLOAD_SHARE = { least: 1 / 8, most: 1 / 4 } as const;
-/** How much the share grows with a frame that uploaded all it might and was followed in time by the next. */
+/** Increase of the fraction after a frame that used its budget and was followed in time by the next. */
 const GROWTH = 1 / 512;
 /** Bounds in milliseconds. */
 const [LEAST_MS, MOST_MS] = [1, 5];
 /**
- * Most bytes for one frame, whatever they cost the thread: what the GPU process and the GPU do with them is not measured. With so many in each frame few were late, with 20 MB
- * intervals of up to 110 ms were seen (docs/lod-format.md).
+ * Maximum bytes in one frame, independent of their main-thread time, because the cost in the GPU process and on the GPU
+ * is not measured. With this limit few frames were late; with 20 MB intervals of up to 110 ms occurred
+ * (docs/lod-format.md).
  */
 export const MOST_UPLOAD_BYTES = 14e6;
-/** What bytes are thought to cost before any has been uploaded: that of 650 MB a second. */
+/** Initial estimate of the upload time, before any measurement: 650 MB a second. */
 const [FIRST_MS, FIRST_BYTES] = [2, 1.3e6];
-/** How much an upload counts when the next one has been made: clocks of browsers that tick once a millisecond come out right on average. */
+/**
+ * Weight of the previous average at each upload, so that clocks with a resolution of a millisecond are right on
+ * average.
+ */
 const MEMORY = 0.9;
-/** A frame is late that comes so many times later than usual; frames later than the bound say that the page was hidden or rested. */
+/**
+ * A frame is late if its interval exceeds the usual one by this factor; intervals above PAUSE_MS mean that the page was
+ * hidden or idle.
+ */
 const LATE = 1.75;
 const PAUSE_MS = 250;
-/** How fast the usual time between frames follows shorter and longer ones: a time that one frame in nine falls short of, for a page that draws every other frame is late all the time. */
+/**
+ * Rates of adaptation of the usual interval to shorter and longer ones. It converges to an interval that one frame in
+ * nine undercuts, because a page that draws every other frame is always late.
+ */
 const [FALLS, RISES] = [1 / 8, 1 / 64];
-/** Share of what a frame might upload from which on it counts as all. */
+/** Fraction of the byte budget above which a frame counts as having used it. */
 const FULL = 0.75;
 
 /**
- * How many bytes a frame may upload: what a share of the time between frames is enough for, by what earlier uploads took, and never more than
- * {@link MOST_UPLOAD_BYTES}. The share grows by a little while frames that use it up come in time, and is halved when one comes late
- * (additive increase, multiplicative decrease: Chiu and Jain, 1989).
+ * Limits the bytes that a frame uploads: a fraction of the frame interval, converted by the measured upload rate, and
+ * never more than {@link MOST_UPLOAD_BYTES}. The fraction grows slowly while frames that use it are in time, and is
+ * halved when one is late (additive increase, multiplicative decrease: Chiu and Jain, 1989).
  */
 export class UploadPace {
   #milliseconds = FIRST_MS;
@@ -36,15 +46,15 @@ export class UploadPace {
   #allowed = 0;
   #used = 0;
 
-  /** The share that the next frame may take. */
+  /** Fraction of the interval for the next frame. */
   get share(): number {
     return this.#share;
   }
 
   /**
    * Starts a frame.
-   * @param now milliseconds
-   * @returns bytes that it may upload
+   * @param now Milliseconds.
+   * @returns Number of bytes that it may upload.
    */
   startFrame(now: number): number {
     const interval = now - this.#frameAt;
@@ -57,7 +67,7 @@ export class UploadPace {
     return this.#allowed;
   }
 
-  /** Takes note of what uploading took. */
+  /** Records the duration of an upload. */
   note(bytes: number, milliseconds: number): void {
     this.#used += bytes;
     this.#bytes = MEMORY * this.#bytes + bytes;
@@ -68,7 +78,7 @@ export class UploadPace {
     if (interval > PAUSE_MS) return;
     if (this.#usual === 0) this.#usual = interval;
     if (interval > LATE * this.#usual) {
-      // Whatever made the frame late, it had no time to spare.
+      // For any cause of the delay, the frame had no time to spare.
       if (this.#used > 0) this.#share = Math.max(UPLOAD_SHARE.least, this.#share / 2);
     } else if (this.#used >= FULL * this.#allowed) {
       this.#share = Math.min(UPLOAD_SHARE.most, this.#share + GROWTH);

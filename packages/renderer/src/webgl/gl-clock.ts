@@ -1,18 +1,18 @@
 import type { WorkTime } from '../gpu/queue-clock.js';
 
-/** When the page was told that work was done, and when it was last told that it was not, by the page's clock. */
+/** Time of the notification that work was done, and of the last check before it, by the page's clock. */
 interface Told {
   readonly now: number;
   readonly since: number;
 }
 
-/** Fulfils when all that was drawn until now is done. Rejects where the context is lost. */
+/** Resolves when all commands up to now have completed. Rejects if the context is lost. */
 export async function drawn(gl: WebGL2RenderingContext): Promise<Told> {
   const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
   let since = performance.now();
   try {
-    // Its state changes between tasks only.
+    // The state of the sync object changes only between tasks.
     for (;;) {
       await new Promise((resolve) => setTimeout(resolve));
       if (sync === null || gl.isContextLost()) throw new Error('the WebGL context is lost');
@@ -25,7 +25,7 @@ export async function drawn(gl: WebGL2RenderingContext): Promise<Told> {
   }
 }
 
-/** Times frames as a page waits for them: see `QueueClock`, of which this is WebGL's. */
+/** Times frames as a page experiences them: the WebGL counterpart of `QueueClock`. */
 export class GlClock {
   readonly #gl: WebGL2RenderingContext;
   #last: Told = { now: -Infinity, since: -Infinity };
@@ -35,16 +35,17 @@ export class GlClock {
   }
 
   /**
-   * Times what `draw` draws. Rejects where the context is lost.
-   * @param least what it surely takes, ms: where a browser waits for frames on the page's thread, little else is known
+   * Times the commands of `draw`. Rejects if the context is lost.
+   * @param least Lower bound of the result in ms: some browsers wait for frames on the main thread, so little else is
+   * known.
    */
   async time(draw: () => void, least = 0): Promise<WorkTime> {
     const begin = performance.now();
     draw();
-    // Where the browser draws at once, nothing else could be done meanwhile.
+    // If the browser draws synchronously, the thread was busy for the whole time.
     const busy = performance.now() - begin;
     const told = await drawn(this.#gl);
-    // Of the frame before, which may have been drawn, but not done, when this one was.
+    // Time of the previous frame, which may not have completed when this one was drawn.
     const before = this.#last;
     this.#last = told;
     const atMost = told.now - Math.max(begin, before.since);

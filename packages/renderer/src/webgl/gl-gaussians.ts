@@ -4,17 +4,17 @@ import type { PackedGaussians } from '../pack/pack.js';
 import { makeTexture, requireMemory } from './gl.js';
 import { DATA_WIDTH } from './shaders.js';
 
-/** Words that are handed to the GPU at once: 4 MB, some milliseconds. */
+/** Words uploaded in one step: 4 MB, a few milliseconds. */
 const WORDS_AT_ONCE = 1 << 20;
 /** 32-bit words of a splat's geometry; the first three are its position. */
 const GEOMETRY_WORDS = 8;
-/** Words of what is drawn besides: the projected splat, and its place in the order. */
+/** Words of each splat for drawing: the projected splat, and its place in the order. */
 const FRAME_WORDS = 9;
 
-/** Facts of a scene that frames need. */
+/** Properties of a scene that frames need. */
 export type GlGaussianFacts = Omit<PackedGaussians, 'geometry' | 'sh' | 'chunks' | 'details' | 'leafCount'>;
 
-/** Bytes of GPU memory that a packed scene takes, what frames keep of each splat included. */
+/** Bytes of GPU memory of a packed scene, including the data that frames keep for each splat. */
 export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
   geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
 
@@ -30,10 +30,10 @@ export function positionsIn(geometry: Uint32Array): Float32Array {
   return positions;
 }
 
-/** Runs calls of WebGL at once, and answers what they answer. */
+/** Runs WebGL calls synchronously, and returns their result. */
 export type RunGl = <T>(work: () => T) => T;
 
-/** Rows of a texture that hold a number of texels. */
+/** Number of texture rows for a number of texels. */
 export const rowsOf = (texels: number): number => Math.max(1, Math.ceil(texels / DATA_WIDTH));
 
 /** Packed Gaussians in textures. */
@@ -53,9 +53,10 @@ export class GlGaussians {
   }
 
   /**
-   * Copies packed Gaussians to the GPU, in parts, so that the thread can do other things between.
-   * @param run runs each part: `GlHost.run` in a context that is not this renderer's alone
-   * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures hold, `out-of-memory/allocation`
+   * Uploads packed Gaussians to the GPU, in parts, so that other tasks can run in between.
+   * @param run Runs each part: `GlHost.run` in a context that this renderer shares with others.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures hold,
+   * `out-of-memory/allocation`
    */
   static async upload(
     gl: WebGL2RenderingContext,
@@ -93,7 +94,7 @@ async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content:
   for (let first = 0; first < words.length;) {
     if (first > 0) await turn();
     const left = words.length - first;
-    // What is less than a row goes alone.
+    // An incomplete row is uploaded separately.
     const [width, rows] =
       left < rowWords ? [left / texelWords, 1] : [DATA_WIDTH, Math.min(rowsAtOnce, Math.floor(left / rowWords))];
     const row = first / rowWords;

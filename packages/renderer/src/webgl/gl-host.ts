@@ -9,20 +9,21 @@ import { borrowState } from './gl-state.js';
 import { DATA_WIDTH, hostedQuadsFragment, hostedQuadsVertex, HostedView } from './shaders.js';
 import { isSameView, orderView, SplatOrder, type OrderView } from './splat-order.js';
 
-/** Sorting that takes longer, ms, is not done for each frame, and takes no more than this share of the time. */
+/** A sort that takes longer, ms, does not run for each frame, and uses at most this fraction of the time. */
 const [QUICK_SORT_MS, SORT_SHARE] = [8, 0.25];
 const TEXTURES = ['shapes', 'paints', 'order', 'geometry', 'stored_depth'];
 
-/** Where a host draws, and what it has drawn there. */
+/** Destination in a host's frame, and the host's depth. */
 export interface GlHostFrame extends Omit<GlFrameTarget, 'keeps'>, DepthPlanes {
   /**
-   * What hides splats. `framebuffer`: the depth buffer of the framebuffer, which is copied; a texture of depth that is as large as the framebuffer's part up to the
-   * rectangle's upper right corner, without comparison; or nothing. Default: `framebuffer`.
+   * Depth that hides splats. `framebuffer`: the depth buffer of the framebuffer, which is copied. A depth texture,
+   * without comparison, as large as the region of the framebuffer up to the upper right corner of the rectangle. Or
+   * null for none. Default: `framebuffer`.
    */
   readonly depth?: 'framebuffer' | WebGLTexture | null | undefined;
 }
 
-/** Depth of a host, and where the camera's image lies in it. */
+/** Depth of a host, and the offset of the camera's image in it. */
 interface Hidden {
   readonly texture: WebGLTexture;
   readonly frame: GlHostFrame;
@@ -39,13 +40,13 @@ interface DepthCopy {
 }
 
 /**
- * Draws splats in the frame of a page that has a WebGL 2 context of its own: a map, or an engine. Splats lie over what the host has drawn, and behind what its depth says
- * is nearer. The state of the context is put back after each call.
+ * Draws splats in the frame of a page with its own WebGL 2 context: a map, or an engine. Splats are blended over the
+ * host's frame, and hidden by its depth. Each call restores the state of the context.
  *
  * ```ts
  * const host = new GlHost(gl);
  * const splats = await host.load(packGaussians(cloud));
- * // In each frame, once the host has drawn what is opaque:
+ * // In each frame, once the host has drawn opaque objects:
  * const camera = cameraFromProjection(view, projection, { width, height, clipDepth: '-1..1' });
  * if (!splats.draw(camera, { framebuffer, x, y })) requestFrame();
  * ```
@@ -59,7 +60,7 @@ export class GlHost {
     this.#gl = gl;
   }
 
-  /** Runs calls of the renderer, or of WebGL, and puts the context's state back. */
+  /** Runs calls of the renderer, or of WebGL, and restores the state of the context. */
   readonly run: RunGl = (work) => {
     const giveBack = borrowState(this.#gl);
     try {
@@ -70,9 +71,10 @@ export class GlHost {
   };
 
   /**
-   * Draws a frame over what the host has drawn.
-   * @param request the host's camera: see `cameraFromProjection`, with `clipDepth: '-1..1'`
-   * @throws GaussianSplatError `argument/value` for a framebuffer whose depth cannot be copied; as `GlRenderer.render`
+   * Draws a frame over the host's frame.
+   * @param request With the host's camera: see `cameraFromProjection`, with `clipDepth: '-1..1'`.
+   * @throws GaussianSplatError `argument/value` for a framebuffer whose depth cannot be copied; also as
+   * `GlRenderer.render` does.
    */
   draw(renderer: GlRenderer, request: GlFrameRequest, frame: GlHostFrame = {}): void {
     this.run(() => {
@@ -84,7 +86,7 @@ export class GlHost {
   }
 
   /**
-   * Copies a scene to the GPU, in parts.
+   * Uploads a scene to the GPU, in parts.
    * @throws GaussianSplatError `out-of-memory/*`, `unsupported/webgl`
    */
   async load(packed: PackedGaussians): Promise<HostedSplats> {
@@ -98,7 +100,7 @@ export class GlHost {
     }
   }
 
-  /** Frees its GPU memory, but for that of scenes. */
+  /** Frees its GPU memory, except that of scenes. */
   destroy(): void {
     this.#program?.destroy();
     this.#program = undefined;
@@ -127,7 +129,10 @@ export class GlHost {
     };
   }
 
-  /** Rectangles of framebuffers with several samples are copied to the same place only: the copy begins at the framebuffer's corner. */
+  /**
+   * Rectangles of multisampled framebuffers can be copied only to the same place, so the copy begins at the
+   * framebuffer's corner.
+   */
   #copyDepth({ camera }: GlFrameRequest, { framebuffer = null, x = 0, y = 0 }: GlHostFrame): WebGLTexture {
     const gl = this.#gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
@@ -142,7 +147,7 @@ export class GlHost {
       blit(copy);
       return copy.texture;
     }
-    // Formats must be the same, and that of a canvas may be another than it says.
+    // The formats must be the same, and that of a canvas may differ from its attributes.
     for (const format of depthFormats(gl, framebuffer === null)) {
       const made = this.#makeCopy(format, framebuffer, width, height);
       blit(made);
@@ -170,7 +175,7 @@ export class GlHost {
   }
 }
 
-/** A scene in a host's frames, in order of depth. */
+/** A scene in a host's frames, sorted by depth. */
 export class HostedSplats {
   readonly #host: GlHost;
   readonly #renderer: GlRenderer;
@@ -191,10 +196,11 @@ export class HostedSplats {
   }
 
   /**
-   * Draws the scene over what the host has drawn.
-   * @param camera see `cameraFromProjection`, with `clipDepth: '-1..1'`; where the scene stands is part of its view
-   * @returns false where the order is that of an older view: draw again soon
-   * @throws GaussianSplatError `argument/camera`, `argument/value` for a framebuffer whose depth cannot be copied, `out-of-memory/allocation`
+   * Draws the scene over the host's frame.
+   * @param camera See `cameraFromProjection`, with `clipDepth: '-1..1'`; its view includes the position of the scene.
+   * @returns False if the order is that of an older view: draw again soon.
+   * @throws GaussianSplatError `argument/camera`, `argument/value` for a framebuffer whose depth cannot be copied,
+   * `out-of-memory/allocation`
    */
   draw(camera: Camera, frame?: GlHostFrame, how: Partial<Omit<GlFrameRequest, 'camera'>> = {}): boolean {
     const isSorted = this.#sort(camera);
@@ -222,7 +228,7 @@ export class HostedSplats {
   }
 }
 
-/** Formats that the depth buffer of the bound framebuffer may have, the likeliest first. */
+/** Formats that the depth buffer of the bound framebuffer may have, most likely first. */
 function depthFormats(gl: WebGL2RenderingContext, isCanvas: boolean): GLenum[] {
   const [depth, stencil] = isCanvas ? [gl.DEPTH, gl.STENCIL] : [gl.DEPTH_ATTACHMENT, gl.STENCIL_ATTACHMENT];
   const ask = (attachment: GLenum, name: GLenum): number =>

@@ -1,14 +1,14 @@
-/** What lies under single points of the last frame: the runs of `probe_depth`, joined on the page. */
+/** Finds the splats under single points of the last frame: the runs of `probe_depth`, joined on the CPU. */
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { makeTarget, makeTexture, type GlProgram } from './gl.js';
 import type { ProbeView } from './shaders.js';
 
-/** Runs of a point: a fragment each. */
+/** Runs for each point: one fragment each. */
 const RUNS = 1024;
-/** Points that are asked about at a time. */
+/** Maximum number of points in one pass. */
 const MOST_POINTS = 256;
 const NUMBERS = 4;
-/** GLSL may assume that there are no infinities. */
+/** GLSL compilers may assume that there are no infinities. */
 const LARGEST_FLOAT32 = 3.4e38;
 
 export interface GlProbeSource {
@@ -16,22 +16,22 @@ export interface GlProbeSource {
   readonly program: GlProgram<typeof ProbeView>;
   /** Shapes, paints and the order from near to far. */
   readonly textures: readonly WebGLTexture[];
-  /** Splats in the order. */
+  /** Number of splats in the order. */
   readonly count: number;
-  /** Binds what finds surfaces, with a texture of questions: see shaders/webgl/probe_surface.wgsl. */
+  /** Binds the program that finds surfaces, with a texture of queries: see shaders/webgl/probe_surface.wgsl. */
   useSurface(asked: WebGLTexture): void;
 }
 
-/** The ranks that are looked at for a point, from one on to before another. */
+/** Range of ranks to search for a point. */
 interface Range {
   readonly first: number;
   readonly end: number;
 }
 
-/** Shares of the light that are left behind the near, the middle and the far depth of an answer. */
+/** Transmittance behind the near, the middle and the far depth of an answer. */
 const LEFT = [0.9, 0.5, 0.1] as const;
 
-/** Waits for the GPU, so that all passes see the same frame: for clicks and labels, not for every frame. */
+/** Waits for the GPU, so that all passes see the same frame: call it for clicks and labels, not for every frame. */
 export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]): ProbeAnswer[] {
   if (points.length > MOST_POINTS) {
     const first = probeSplats(source, points.slice(0, MOST_POINTS));
@@ -51,7 +51,10 @@ export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]
   }));
 }
 
-/** Ranks of the splats behind which less than a share of the light is left: the runs that hold them are looked at again, until each is one splat. */
+/**
+ * Ranks of the splats behind which less than a fraction of the light is left: the runs that contain them are subdivided
+ * until each is one splat.
+ */
 function ranksAt(
   source: GlProbeSource,
   points: readonly ProbePoint[],
@@ -76,13 +79,13 @@ function ranksAt(
   return crossings.map((place, i) => (place === null ? null : current[i].first + place.at));
 }
 
-/** A splat, and the depth at which it is densest along the ray of a point. */
+/** A splat, and its densest depth along the ray of a point. */
 interface Surface {
   readonly depth: number;
   readonly index: number;
 }
 
-/** The splats of ranks, and their depths along the rays of the points; one fragment each. */
+/** The splats at the given ranks, and their depths along the rays of the points; one fragment each. */
 function surfacesOf(
   { gl, useSurface }: GlProbeSource,
   points: readonly ProbePoint[],
@@ -129,7 +132,7 @@ function product(row: Float32Array, number: number): number {
   return result;
 }
 
-/** The first run behind which less than a share of the light is left, and the light that comes to it. */
+/** The first run behind which less than a fraction of the light is left, and the light in front of it. */
 function crossing(row: Float32Array, before: number, share: number): { at: number; light: number } | null {
   let light = before;
   for (let at = 0; at < RUNS; at++) {
@@ -140,7 +143,7 @@ function crossing(row: Float32Array, before: number, share: number): { at: numbe
   return null;
 }
 
-/** Of each point a row of runs: light that each lets through, and light that its splats in front of the point let through. */
+/** A row of runs for each point: the transmittance of each run, and that of its splats in front of the point. */
 function lookAt(
   { gl, program, textures }: GlProbeSource,
   points: readonly ProbePoint[],
@@ -155,7 +158,7 @@ function lookAt(
       const point = [x, y, Math.min(depth, LARGEST_FLOAT32)];
       program.use({ point, first, end, run: runOf(first, end) }, textures);
       gl.viewport(0, row, RUNS, 1);
-      // One triangle, larger than the target: only the row is to be painted.
+      // A triangle larger than the target, scissored to the row.
       gl.enable(gl.SCISSOR_TEST);
       gl.scissor(0, row, RUNS, 1);
       gl.drawArrays(gl.TRIANGLES, 0, 3);

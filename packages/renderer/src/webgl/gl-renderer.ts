@@ -34,12 +34,12 @@ const { QUAD_BATCH } = constants;
 /** Two triangles. */
 const INDICES_PER_QUAD = 6;
 const TRANSPARENT: Rgba = [0, 0, 0, 0];
-/** A corner of a box that has everything in it. */
+/** A corner of a box that contains everything. */
 const EVERYWHERE = [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32];
 const SPLAT_TEXTURES = ['shapes', 'paints', 'order'];
 const SURFACE_TEXTURES = ['geometry', 'order', 'asked'];
 
-/** Formats that splats are blended in: `rgba8unorm` where the browser blends no floats. */
+/** Formats for blending splats: `rgba8unorm` if the browser cannot blend floats. */
 export type GlAccumulationFormat = AccumulationFormat | 'rgba8unorm';
 
 const BYTES_PER_PIXEL: Record<GlAccumulationFormat, number> = { rgba8unorm: 4, rgba16float: 8, rgba32float: 16 };
@@ -48,13 +48,13 @@ const BYTES_PER_PIXEL: Record<GlAccumulationFormat, number> = { rgba8unorm: 4, r
 export interface GlFrameRequest {
   /** Its width and height must be those of the canvas. */
   readonly camera: Camera;
-  /** Spherical harmonics above this degree are not evaluated. */
+  /** Maximum degree of spherical harmonics to evaluate. */
   readonly shDegree: ShDegree;
-  /** In place of the scene's own. */
+  /** Overrides the filter of the scene. */
   readonly filter?: SplatFilter | undefined;
-  /** `rgba32float` where the browser blends it. */
+  /** `rgba32float` applies if the browser can blend it. */
   readonly accumulation: AccumulationFormat;
-  /** Share of the canvas's width and height that is really drawn. */
+  /** Fraction of the canvas's width and height that is rendered. */
   readonly resolutionScale: number;
 }
 
@@ -65,27 +65,27 @@ export interface GlFrameTarget {
   /** Its lower left corner, pixels. Default: 0, 0. */
   readonly x?: number | undefined;
   readonly y?: number | undefined;
-  /** Lays the splats over what is there, in place of a background. Default: false. */
+  /** Blends the splats over the content instead of a background. Default: false. */
   readonly keeps?: boolean | undefined;
 }
 
-/** What draws the quads of a frame in place of the renderer's own program. */
+/** Replaces the renderer's program for quads. */
 export interface GlQuads {
   use(frame: GlQuadsFrame): void;
 }
 
 export interface GlQuadsFrame {
-  /** The camera, in the pixels that are drawn. */
+  /** The camera, in rendered pixels. */
   readonly camera: Camera;
-  /** Splats in the order. */
+  /** Number of splats in the order. */
   readonly count: number;
-  /** What positions in textures are relative to. */
+  /** Origin of the positions in textures. */
   readonly origin: Vector3;
-  /** Shapes, paints, order and geometry. */
+  /** Textures: shapes, paints, order and geometry. */
   readonly textures: readonly WebGLTexture[];
 }
 
-/** What splats are blended into. */
+/** Target of the blending. */
 interface Accumulation {
   readonly texture: WebGLTexture;
   readonly target: WebGLFramebuffer;
@@ -94,7 +94,7 @@ interface Accumulation {
   readonly height: number;
 }
 
-/** The best format that a browser blends, up to the one that is asked for. */
+/** The best format that a browser can blend, up to the requested one. */
 export function blendable(gl: WebGL2RenderingContext, wanted: AccumulationFormat): GlAccumulationFormat {
   const float = gl.getExtension('EXT_color_buffer_float');
   if (wanted === 'rgba32float' && float && gl.getExtension('EXT_float_blend')) return wanted;
@@ -102,8 +102,8 @@ export function blendable(gl: WebGL2RenderingContext, wanted: AccumulationFormat
 }
 
 /**
- * Draws one scene with WebGL 2, by the shaders of WebGPU: each splat is projected once into two textures, then drawn as a quad in an order that comes from
- * outside (`SplatOrder`), blended, and composed onto the canvas.
+ * Draws one scene with WebGL 2, with the shaders of WebGPU: each splat is projected once into two textures, then drawn
+ * as a quad in an externally computed order (`SplatOrder`), blended, and composed onto the canvas.
  */
 export class GlRenderer {
   readonly #gl: WebGL2RenderingContext;
@@ -113,7 +113,7 @@ export class GlRenderer {
   readonly #compose: GlProgram<typeof layouts.Compose>;
   #probe: GlProgram<typeof ProbeView> | undefined;
   #surface: GlProgram<typeof layouts.View> | undefined;
-  /** What the splats were projected with. */
+  /** Parameters of the last projection. */
   #view: StructValues<typeof layouts.View> | undefined;
   readonly #corners: WebGLVertexArrayObject;
   readonly #indices: WebGLBuffer;
@@ -121,12 +121,12 @@ export class GlRenderer {
   readonly #paints: WebGLTexture;
   readonly #order: WebGLTexture;
   readonly #splats: WebGLFramebuffer;
-  /** Splats in the order. */
+  /** Number of splats in the order. */
   #count = 0;
   #accumulation: Accumulation | undefined;
-  /** The last frame: as it is shown, and as it was drawn. */
+  /** The last frame: at its displayed size, and at its rendered size. */
   #last: { readonly camera: Camera; readonly drawn: Camera } | undefined;
-  /** What the splats were last projected with. */
+  /** Key of the last projection. */
   #projected = '';
 
   /**
@@ -147,16 +147,16 @@ export class GlRenderer {
     requireMemory(gl, `scene of ${gaussians.facts.count} splats`);
   }
 
-  /** Bytes of GPU memory of what is drawn into, the splats not counted. */
+  /** Bytes of GPU memory of the render targets, without the splats. */
   get byteLength(): number {
     const { format, width, height } = this.#accumulation ?? { format: 'rgba8unorm', width: 0, height: 0 };
     return BYTES_PER_PIXEL[format] * width * height;
   }
 
   /**
-   * Draws in this order from now on.
-   * @param order numbers of splats from near to far, in whole rows of `DATA_WIDTH`
-   * @param count how many of them count
+   * Sets the order for subsequent frames.
+   * @param order Indices of splats from near to far, in whole rows of `DATA_WIDTH`.
+   * @param count Number of valid indices.
    */
   setOrder(order: Uint32Array, count: number): void {
     const gl = this.#gl;
@@ -169,7 +169,7 @@ export class GlRenderer {
 
   /**
    * Draws one frame, for {@link present}.
-   * @param quads what draws them, in place of the renderer's own program
+   * @param quads Replaces the renderer's program for quads.
    * @throws GaussianSplatError `argument/camera` for a camera out of range, `out-of-memory/allocation`
    */
   render(request: GlFrameRequest, quads?: GlQuads): void {
@@ -182,8 +182,8 @@ export class GlRenderer {
   }
 
   /**
-   * Composes the last frame onto the canvas, from its lower left corner on, or into another target.
-   * @param background premultiplied
+   * Composes the last frame onto the canvas, from its lower left corner, or into another target.
+   * @param background Premultiplied color.
    */
   present(
     background: Rgba = TRANSPARENT,
@@ -205,7 +205,8 @@ export class GlRenderer {
   }
 
   /**
-   * Looks into the last frame at single points of it, as `Viewpoint.probe` does. Waits for the GPU: for clicks and labels, not for every frame.
+   * Probes single points of the last frame, as `Viewpoint.probe` does. Waits for the GPU: call it for clicks and
+   * labels, not for every frame.
    */
   probe(points: readonly ProbePoint[]): ProbeAnswer[] {
     const gl = this.#gl;
@@ -217,7 +218,7 @@ export class GlRenderer {
     return this.#view ? probeSplats(source, points) : [];
   }
 
-  /** Counts the splats that the last frame drew. Reads all of them back: for panels, not for every frame. */
+  /** Returns the number of splats in the last frame. Reads all of them back: call it for panels, not for every frame. */
   countDrawn(): number {
     const gl = this.#gl;
     const rows = rowsOf(this.#gaussians.facts.count);
@@ -231,7 +232,7 @@ export class GlRenderer {
     return count;
   }
 
-  /** Frees the GPU memory, but for that of the Gaussians. */
+  /** Frees the GPU memory, except that of the Gaussians. */
   destroy(): void {
     const gl = this.#gl;
     for (const program of [this.#project, this.#quads, this.#compose, this.#probe, this.#surface]) program?.destroy();
@@ -274,7 +275,7 @@ export class GlRenderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     const { width, height } = camera;
     gl.viewport(0, 0, width, height);
-    // Nothing painted yet: black, and all light still to come from behind.
+    // Clears to black with full transmittance.
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
     if (this.#count === 0) return;
     gl.enable(gl.BLEND);
@@ -289,7 +290,7 @@ export class GlRenderer {
     gl.bindVertexArray(null);
   }
 
-  /** Of the canvas's size, for any share of it that is drawn: nothing is allocated while only the camera moves. */
+  /** Sized for the canvas at any resolution scale: nothing is allocated while only the camera moves. */
   #accumulationOf({ width, height }: Camera, wanted: AccumulationFormat): Accumulation {
     const gl = this.#gl;
     const format = blendable(gl, wanted);

@@ -1,7 +1,7 @@
-/** Texture units that the renderer's programs read. */
+/** Texture units of the renderer's programs. */
 const UNITS = 6;
 
-/** What of a context's state the renderer sets, or draws wrongly under. */
+/** State of a context that the renderer changes, or that would break its drawing. */
 const ENABLED = [
   'BLEND',
   'CULL_FACE',
@@ -13,7 +13,7 @@ const ENABLED = [
   'STENCIL_TEST',
 ] as const;
 
-/** How rows of what is written and read lie in memory, with the values that the renderer takes them for. */
+/** Pixel storage parameters, with the values that the renderer assumes. */
 const PIXEL_STORE = {
   UNPACK_ALIGNMENT: 4,
   UNPACK_FLIP_Y_WEBGL: false,
@@ -29,8 +29,8 @@ const PIXEL_STORE = {
 } as const;
 
 /**
- * Notes the state of a context that somebody else draws with, and brings it to what the renderer takes for granted.
- * @returns what puts it back
+ * Saves the state of a context that other code draws with, and sets the state that the renderer assumes.
+ * @returns A function that restores it.
  */
 export function borrowState(gl: WebGL2RenderingContext): () => void {
   const get = (name: GLenum): never => gl.getParameter(name) as never;
@@ -81,7 +81,7 @@ export function borrowState(gl: WebGL2RenderingContext): () => void {
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, read);
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, unpack);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, pack);
-    // A range of 0 bytes stands for the whole buffer.
+    // A range of 0 bytes means the whole buffer.
     if (size === 0 || first === null) gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, first);
     else gl.bindBufferRange(gl.UNIFORM_BUFFER, 0, first, start, size);
     gl.bindBuffer(gl.UNIFORM_BUFFER, uniforms);

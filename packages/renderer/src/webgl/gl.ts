@@ -1,4 +1,4 @@
-/** What WebGL 2 takes to make things. */
+/** Helpers to create WebGL 2 objects. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { writeStruct, type StructLayout, type StructValues } from '../gpu/struct.js';
 
@@ -27,7 +27,7 @@ export class GlProgram<L extends StructLayout> {
     textures.forEach((name, unit) => gl.uniform1i(gl.getUniformLocation(this.#program, `t_${name}`), unit));
   }
 
-  /** Makes it the one that draws. @param textures in the order of their names */
+  /** Makes the program current. @param textures In the order of their names. */
   use(values: StructValues<L>, textures: readonly WebGLTexture[]): void {
     const gl = this.#gl;
     gl.useProgram(this.#program);
@@ -60,7 +60,7 @@ function link(gl: WebGL2RenderingContext, texts: readonly [vertex: string, fragm
   const isLinked = gl.getProgramParameter(program, gl.LINK_STATUS) as boolean;
   const said = [gl.getProgramInfoLog(program), ...shaders.map((shader) => gl.getShaderInfoLog(shader))];
   for (const shader of shaders) gl.deleteShader(shader);
-  // A lost context links nothing, and says so itself.
+  // A lost context links nothing, and reports its own error.
   if (isLinked || gl.isContextLost()) return program;
   throw new GaussianSplatError('unsupported/webgl', {
     where: 'the WebGL 2 renderer',
@@ -70,7 +70,7 @@ function link(gl: WebGL2RenderingContext, texts: readonly [vertex: string, fragm
   });
 }
 
-/** A texture of one level, whose texels are read one by one. */
+/** A texture with one level, whose texels are read without filtering. */
 export function makeTexture(
   gl: WebGL2RenderingContext,
   format: GLenum,
@@ -85,7 +85,7 @@ export function makeTexture(
   return texture;
 }
 
-/** Something to draw into. */
+/** Creates a framebuffer. */
 export function makeTarget(gl: WebGL2RenderingContext, textures: readonly WebGLTexture[]): WebGLFramebuffer {
   const target = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, target);
@@ -96,7 +96,10 @@ export function makeTarget(gl: WebGL2RenderingContext, textures: readonly WebGLT
   return target;
 }
 
-/** @throws GaussianSplatError `out-of-memory/allocation` if memory was lacking for what was just made. Waits for the browser: not for frames. */
+/**
+ * @throws GaussianSplatError `out-of-memory/allocation` if the last creation ran out of memory. Waits for the browser:
+ * not for frames.
+ */
 export function requireMemory(gl: WebGL2RenderingContext, what: string): void {
   if (gl.getError() !== gl.OUT_OF_MEMORY) return;
   throw new GaussianSplatError('out-of-memory/allocation', {

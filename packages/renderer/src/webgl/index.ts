@@ -1,4 +1,4 @@
-/** Drawing with WebGL 2 where a browser has no WebGPU: whole scenes, sorted on a processor, by the same shaders. */
+/** WebGL 2 backend for browsers without WebGPU: whole scenes, sorted on the CPU, with the same shaders. */
 export { drawn, GlClock } from './gl-clock.js';
 export { glBytes, GlGaussians, positionsIn, type GlGaussianFacts, type RunGl } from './gl-gaussians.js';
 export { GlHost, HostedSplats, type GlHostFrame } from './gl-host.js';

@@ -1,10 +1,13 @@
 import { unpackSplat } from '../pack/unpack.js';
 import { GEOMETRY_WORDS } from '../pack/words.js';
 
-/** Splats that are unpacked at a time. */
+/** Splats unpacked at a time. */
 const BLOCK = 1024;
 
-/** [N] areas of the squares around the largest sections of packed splats, as far out as these paint anything: in squared units of their positions. */
+/**
+ * [N] areas of the squares around the largest cross sections of packed splats, as far out as they are visible, in
+ * squared units of their positions.
+ */
 export function areasIn(geometry: Uint32Array): Float32Array {
   const count = geometry.length / GEOMETRY_WORDS;
   const areas = new Float32Array(count);
@@ -20,7 +23,7 @@ export function areasIn(geometry: Uint32Array): Float32Array {
   return areas;
 }
 
-/** The product of the two longest axes is the largest minor of the factor, to a factor of the square root of 3. */
+/** The product of the two longest axes is the largest minor of the factor, up to a factor of √3. */
 function areaOf(factors: Float32Array, at: number, opacity: number): number {
   const [xx, yx, yy] = [factors[at], factors[at + 1], factors[at + 2]];
   const [zx, zy, zz] = [factors[at + 3], factors[at + 4], factors[at + 5]];

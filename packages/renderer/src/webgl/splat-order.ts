@@ -1,23 +1,26 @@
-/** Puts splats in order of depth, on a processor: WebGL has no compute shaders. No DOM and no GPU here, since a worker runs it. */
+/**
+ * Sorts splats by depth on the CPU, because WebGL has no compute shaders. Uses no DOM and no GPU, because a worker runs
+ * it.
+ */
 import { eyeOf, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 
-/** What an order depends on: the depth of a point p is axis · p + offset, or its distance from `point`. */
+/** Sort key of an order: the depth of a point p is axis · p + offset, or its distance from `point`. */
 export interface OrderView {
   readonly axis: Vector3;
   readonly offset: number;
   /** Only splats whose depth is within this range are listed. */
   readonly near: number;
   readonly far: number;
-  /** Where set, splats are in order of their distance from here, and all are listed: turning the camera changes nothing. */
+  /** If set, splats are sorted by the distance from this point, and all are listed: camera rotations change nothing. */
   readonly point?: Vector3 | undefined;
-  /** Rows of the camera's matrix that give x and y from the axis on, in halves of the image at depth 1. */
+  /** Rows of the camera matrix for x and y relative to the axis, in units of half the image at depth 1. */
   readonly across: readonly (readonly [x: number, y: number, z: number, offset: number, center: number])[];
-  /** Share of the image that one unit of area takes at depth 1. */
+  /** Fraction of the image that one unit of area covers at depth 1. */
   readonly shareOfArea: number;
   readonly isParallel: boolean;
 }
 
-/** The view of a camera, for positions relative to an origin. */
+/** Sort parameters of a camera, for positions relative to an origin. */
 export function orderView(camera: Camera, origin: Vector3): OrderView {
   const { worldToCamera: m, near, far, width, height, fx, fy, cx, cy, orthographic = false } = camera;
   const axis: Vector3 = [m[8], m[9], m[10]];
@@ -34,7 +37,7 @@ export function orderView(camera: Camera, origin: Vector3): OrderView {
   };
 }
 
-/** The view of a camera in whose order splats lie by their distance from a point, by default from its eye. */
+/** Sort parameters of a camera for the order by distance from a point, by default from its eye. */
 export function distanceView(camera: Camera, origin: Vector3, eye: Vector3 = eyeOf(camera.worldToCamera)): OrderView {
   return { ...orderView(camera, origin), point: subtract(eye, origin) };
 }
@@ -47,17 +50,18 @@ export const isSameView = (a: OrderView, b: OrderView): boolean =>
 const isSamePlace = (a: Vector3 | undefined, b: Vector3 | undefined): boolean =>
   a !== undefined && b !== undefined && a.every((value, i) => value === b[i]);
 
-/** Shares of the image below this count without a look whether the image has them. */
+/** Smaller splats, as a fraction of the image, count without a test whether they are in the image. */
 const SMALL_SHARE = 1 / 64;
 
 /** Values of a digit: half of a float32. */
 const DIGITS = 1 << 16;
 
 /**
- * A stable radix sort by the float32 depth, exactly: the bits of a positive float32 grow as it does. Two passes of 16 bits.
+ * A stable radix sort by the exact float32 depth: the bits of positive float32 numbers are monotonic. Two passes of 16
+ * bits.
  */
 export class SplatOrder {
-  /** How often the splats of the last order cover the image, by their areas. */
+  /** Total coverage of the image by the splats of the last order, from their areas. */
   covered = 0;
   readonly #positions: Float32Array;
   readonly #areas: Float32Array | undefined;
@@ -69,7 +73,8 @@ export class SplatOrder {
 
   /**
    * @param positions [N, 3]
-   * @param areas of their largest sections, in squared units of the positions; [N]. Without them nothing is covered
+   * @param areas Areas of their largest cross sections, in squared units of the positions; [N]. Without them the
+   * coverage is 0.
    */
   constructor(positions: Float32Array, areas?: Float32Array) {
     this.#areas = areas;
@@ -83,7 +88,7 @@ export class SplatOrder {
   /**
    * Lists the splats from near to far.
    * @param target [at least N]
-   * @returns how many are listed
+   * @returns Number of listed splats.
    */
   sort(view: OrderView, target: Uint32Array): number {
     const count = view.point ? this.#findDistances(view.point) : this.#findKeys(view);
@@ -102,7 +107,7 @@ export class SplatOrder {
     return count;
   }
 
-  /** How often the listed splats cover the image. */
+  /** Total coverage of the image by the listed splats. */
   #sumShares({ across, shareOfArea, isParallel }: OrderView, count: number, areas: Float32Array): number {
     const positions = this.#positions;
     const depths = new Float32Array(this.#keys.buffer);
@@ -116,14 +121,14 @@ export class SplatOrder {
     return sum;
   }
 
-  /** Whether the center of a splat lies in the image, or so near that the splat may. */
+  /** Whether the center of a splat lies in the image, or near enough that the splat may reach it. */
   #isWithin(across: OrderView['across'], positions: Float32Array, i: number, depth: number, share: number): boolean {
     const [p, q, r] = [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]];
     const reach = 1 + 2 * Math.sqrt(share);
     return across.every(([x, y, z, o, c]) => Math.abs((x * p + y * q + z * r + o) / depth + c) <= reach);
   }
 
-  /** Keys of the splats within the range, their numbers, and how often each digit occurs. */
+  /** Computes keys and indices of the splats within the range, and a histogram of each digit. */
   #findKeys({ axis: [x, y, z], offset, near, far }: OrderView): number {
     const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
     const depths = new Float32Array(keys.buffer);
@@ -141,7 +146,7 @@ export class SplatOrder {
     return count;
   }
 
-  /** The same with the squared distance in place of the depth. */
+  /** The same with the squared distance instead of the depth. */
   #findDistances([x, y, z]: Vector3): number {
     const [positions, keys, listed, low, high] = [this.#positions, this.#keys, this.#listed, this.#low, this.#high];
     const distances = new Float32Array(keys.buffer);
@@ -163,7 +168,7 @@ export class SplatOrder {
   }
 }
 
-/** From how often digits occur to where the first of each goes. */
+/** Converts a histogram of digits to start indices. */
 function startPlaces(counts: Uint32Array): void {
   let sum = 0;
   for (let digit = 0; digit < DIGITS; digit++) {
