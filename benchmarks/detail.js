@@ -104,8 +104,8 @@ async function measure() {
   Object.assign(report, { splats: manifest.splats, pages: scene.progress.total });
   const world = new World();
   world.add({ scene });
-  const levers = { detail, splatBudget: splats, detailFade: number('fade', 0.5) };
-  const viewpoint = new Viewpoint(device, world, { settings: levers });
+  const settings = { detail, splatBudget: splats, detailFade: number('fade', 0.5) };
+  const viewpoint = new Viewpoint(device, world, { settings: settings });
   report.levers = viewpoint.resolvedSettings;
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.STORAGE_BINDING;
   const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage });
@@ -116,7 +116,7 @@ async function measure() {
     manifest,
     traffic,
     target,
-    levers,
+    settings,
     width,
     height,
     turn,

@@ -1,6 +1,6 @@
 /** The page of pictures in motion: elements in a page, steps of the load, and whether they keep in time. See docs/benchmark.md. */
 import { fetchScene, readScene } from '@gaussian-splat/formats';
-import { LADDER } from '../packages/element/dist/pace/ladder.js';
+import { QUALITY_LEVELS } from '../packages/element/dist/dynamic-quality/quality-levels.js';
 import { showError, showProgress } from './page/show.js';
 import { Burner } from './pace/burner.js';
 import { figuresOf, pixelsFor, summarize } from './pace/figures.js';
@@ -19,7 +19,7 @@ import { placeCopies } from './scene/placement.js';
 const CALIBRATION_SECONDS = 1;
 const CALIBRATION_SIDES = [0.5, 1.5];
 /** Names of all levels, the true image first. */
-const NAMES = LADDER.map(({ name }) => name);
+const NAMES = QUALITY_LEVELS.map(({ name }) => name);
 
 /** Address of the scene: that of the file, or of as many splats of copies side by side. */
 async function sceneOf({ scene, splats, degree }) {

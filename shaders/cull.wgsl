@@ -3,13 +3,13 @@
 // order of the file and splats of equal depth never flicker.
 #import shared/visibility
 #import shared/group
-#import shared/gathered
+#import shared/cull_stats
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
 @group(0) @binding(2) var<storage, read_write> visible_bits: array<u32>;
 @group(0) @binding(3) var<storage, read_write> group_counts: array<u32>;
-@group(0) @binding(4) var<storage, read_write> gathered: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> cull_stats: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> chunk_shares: array<f32>;
 
 var<workgroup> bits: array<atomic<u32>, WORDS_PER_GROUP>;
@@ -28,7 +28,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   if (i < view.splat_count) {
     let found = gaussian_at(i);
     if (!is_usable(found)) {
-      atomicAdd(&gathered[UNUSABLE], 1u);
+      atomicAdd(&cull_stats[UNUSABLE], 1u);
     } else {
       let part = visible_part(found, share);
       if (part.depth > 0.0) {
@@ -46,10 +46,10 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     for (var w = 0u; w < WORDS_PER_GROUP; w++) { count += countOneBits(atomicLoad(&bits[w])); }
     group_counts[group] = count;
     if (count > 0u) {
-      atomicMax(&gathered[NEAREST_INVERTED], atomicLoad(&nearest_inverted));
-      atomicMax(&gathered[FARTHEST], atomicLoad(&farthest));
+      atomicMax(&cull_stats[NEAREST_INVERTED], atomicLoad(&nearest_inverted));
+      atomicMax(&cull_stats[FARTHEST], atomicLoad(&farthest));
       let shares = (atomicLoad(&covered) + COVERED_UNIT / 2u) / COVERED_UNIT;
-      if (shares > 0u) { atomicAdd(&gathered[COVERED], shares); }
+      if (shares > 0u) { atomicAdd(&cull_stats[COVERED], shares); }
     }
   }
 }

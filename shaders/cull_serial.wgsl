@@ -2,14 +2,14 @@
 // another.
 #import shared/visibility
 #import shared/group
-#import shared/gathered
+#import shared/cull_stats
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
 @group(0) @binding(2) var<storage, read_write> visible_bits: array<u32>;
 // Cleared before this pass.
 @group(0) @binding(3) var<storage, read_write> group_counts: array<atomic<u32>>;
-@group(0) @binding(4) var<storage, read_write> gathered: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> cull_stats: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> chunk_shares: array<f32>;
 
 @compute @workgroup_size(WORDS_PER_GROUP)
@@ -27,7 +27,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   for (var k = 0u; k < 32u && first + k < view.splat_count; k++) {
     let found = gaussian_at(first + k);
     if (!is_usable(found)) {
-      atomicAdd(&gathered[UNUSABLE], 1u);
+      atomicAdd(&cull_stats[UNUSABLE], 1u);
       continue;
     }
     let part = visible_part(found, share);
@@ -41,8 +41,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   visible_bits[group * WORDS_PER_GROUP + lane] = bits;
   if (bits != 0u) {
     atomicAdd(&group_counts[group], countOneBits(bits));
-    atomicMax(&gathered[NEAREST_INVERTED], ~nearest);
-    atomicMax(&gathered[FARTHEST], farthest);
-    atomicAdd(&gathered[COVERED], (covered + COVERED_UNIT / 2u) / COVERED_UNIT);
+    atomicMax(&cull_stats[NEAREST_INVERTED], ~nearest);
+    atomicMax(&cull_stats[FARTHEST], farthest);
+    atomicAdd(&cull_stats[COVERED], (covered + COVERED_UNIT / 2u) / COVERED_UNIT);
   }
 }

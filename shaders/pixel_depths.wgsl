@@ -2,7 +2,7 @@
 // between `project` and the sort.
 #import shared/projection
 #import shared/stored_gaussian
-#import shared/gathered
+#import shared/cull_stats
 #import shared/plan
 #import shared/group
 #import shared/densest
@@ -11,7 +11,7 @@
 @group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
 @group(0) @binding(2) var<storage, read> survivors: array<u32>;
 @group(0) @binding(3) var<storage, read> plan: Plan;
-@group(0) @binding(4) var<storage, read> gathered: array<u32>;
+@group(0) @binding(4) var<storage, read> cull_stats: array<u32>;
 // By slot.
 @group(0) @binding(5) var<storage, read_write> pixel_depths: array<PixelDepth>;
 @group(0) @binding(6) var<storage, read_write> keys: array<u32>;
@@ -25,8 +25,8 @@ fn ahead_key(depth: f32) -> u32 {
   let depth_bits = bitcast<u32>(max(depth, 0.0));
   if (view.key_bits == 32u) { return depth_bits; }
   let margin = MARGIN_OCTAVES << OCTAVE_BITS;
-  let nearest = max(~gathered[NEAREST_INVERTED], margin) - margin;
-  let range = f32(max(gathered[FARTHEST] - nearest, 1u));
+  let nearest = max(~cull_stats[NEAREST_INVERTED], margin) - margin;
+  let range = f32(max(cull_stats[FARTHEST] - nearest, 1u));
   let share = f32(max(depth_bits, nearest) - nearest) / range;
   return u32(min(share, 1.0) * f32((1u << view.key_bits) - 1u));
 }

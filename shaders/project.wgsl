@@ -3,7 +3,7 @@
 #import shared/stored_gaussian
 #import shared/sh_color
 #import shared/splat
-#import shared/gathered
+#import shared/cull_stats
 #import shared/plan
 #import shared/group
 #import shared/detail
@@ -14,7 +14,7 @@
 @group(0) @binding(2) var<storage, read> sh: array<vec2u>;
 @group(0) @binding(3) var<storage, read> survivors: array<u32>;
 @group(0) @binding(4) var<storage, read> plan: Plan;
-@group(0) @binding(5) var<storage, read> gathered: array<u32>;
+@group(0) @binding(5) var<storage, read> cull_stats: array<u32>;
 @group(0) @binding(6) var<storage, read_write> splats: array<ProjectedSplat>;
 // Depth keys.
 @group(0) @binding(7) var<storage, read_write> keys: array<u32>;
@@ -29,8 +29,8 @@ fn sh_word(i: u32) -> vec2u {
 fn depth_key(depth: f32) -> u32 {
   let depth_bits = bitcast<u32>(depth);
   if (view.key_bits >= 32u) { return depth_bits; }
-  let nearest = ~gathered[NEAREST_INVERTED];
-  let range = f32(max(gathered[FARTHEST] - nearest, 1u));
+  let nearest = ~cull_stats[NEAREST_INVERTED];
+  let range = f32(max(cull_stats[FARTHEST] - nearest, 1u));
   // A recomputed depth may round to less than the nearest one.
   let share = f32(max(depth_bits, nearest) - nearest) / range;
   return u32(min(share, 1.0) * f32((1u << view.key_bits) - 1u));
@@ -39,7 +39,7 @@ fn depth_key(depth: f32) -> u32 {
 // If the splats cover the image more often than the limit allows, drops those that cover more than an equal portion, so
 // that the rest stays within the limit.
 fn is_left_out(e: Ellipse) -> bool {
-  if (gathered[COVERED] <= view.most_covered) { return false; }
+  if (cull_stats[COVERED] <= view.most_covered) { return false; }
   let part = f32(COVERED_UNIT) * f32(view.most_covered) / f32(max(plan.visible, 1u));
   return f32(covered_share(view, e, covered_box(view, e))) > part;
 }

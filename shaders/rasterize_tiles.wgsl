@@ -5,7 +5,7 @@ fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {}
 fn start_hiding(position: vec2u) {}
 fn hide(pixels: ptr<function, Pixels>, k: u32) {}
 fn hide_rest(pixels: ptr<function, Pixels>) {}
-fn clear_notes(lane: u32) {}
-fn note_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {}
-fn keep_notes(k: u32) {}
-fn note_pixel(pixel: vec2u, row: u32) {}
+fn aux_clear(lane: u32) {}
+fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {}
+fn aux_store(k: u32) {}
+fn aux_pixel(pixel: vec2u, row: u32) {}

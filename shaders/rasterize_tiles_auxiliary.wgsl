@@ -23,20 +23,20 @@ fn start_hiding(position: vec2u) {}
 fn hide(pixels: ptr<function, Pixels>, k: u32) {}
 fn hide_rest(pixels: ptr<function, Pixels>) {}
 
-fn clear_notes(lane: u32) {
+fn aux_clear(lane: u32) {
   atomicStore(&weights[lane], 0u);
 }
 
-fn note_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {
+fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {
   atomicMax(&weights[k], bitcast<u32>(max(max(weight.x, weight.y), max(weight.z, weight.w))));
   note_depth(k, before, after, is_blended);
 }
 
-fn keep_notes(k: u32) {
+fn aux_store(k: u32) {
   let number = survivors[slots[k]];
   if (number < arrayLength(&contributions)) { atomicMax(&contributions[number], atomicLoad(&weights[k])); }
 }
 
-fn note_pixel(pixel: vec2u, row: u32) {
+fn aux_pixel(pixel: vec2u, row: u32) {
   textureStore(depths, pixel, vec4f(half_depth[row]));
 }

@@ -15,7 +15,7 @@
 @group(0) @binding(13) var second_color: texture_2d<f32>;
 
 override tests_depth: bool = true;
-override tells_depth: bool = false;
+override writes_depth: bool = false;
 
 // State of a thread's pixels: the topmost one, the depth of the next layer of each, and their numbers of blended
 // layers.
@@ -70,14 +70,14 @@ fn hide_rest(pixels: ptr<function, Pixels>) {
   }
 }
 
-fn clear_notes(lane: u32) {}
+fn aux_clear(lane: u32) {}
 
-fn note_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {
-  if (tells_depth) { note_depth(k, before, after, is_blended); }
+fn aux_blend(k: u32, weight: Column, before: Column, after: Column, is_blended: vec4<bool>) {
+  if (writes_depth) { note_depth(k, before, after, is_blended); }
 }
 
-fn keep_notes(k: u32) {}
+fn aux_store(k: u32) {}
 
-fn note_pixel(pixel: vec2u, row: u32) {
-  if (tells_depth) { textureStore(median_depth, pixel, vec4f(half_depth[row])); }
+fn aux_pixel(pixel: vec2u, row: u32) {
+  if (writes_depth) { textureStore(median_depth, pixel, vec4f(half_depth[row])); }
 }

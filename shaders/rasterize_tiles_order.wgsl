@@ -4,11 +4,11 @@
 // window is long.
 #import shared/scene_depth
 #import shared/pixel_depth
-#import shared/gathered
+#import shared/cull_stats
 #import shared/paint_tiles
 
 @group(0) @binding(7) var<storage, read> pixel_depths: array<PixelDepth>;
-@group(0) @binding(8) var<storage, read> gathered: array<u32>;
+@group(0) @binding(8) var<storage, read> cull_stats: array<u32>;
 @group(0) @binding(9) var<uniform> scene: SceneDepth;
 @group(0) @binding(10) var stored_depth: texture_2d<f32>;
 // Receives the depth that halves the transmittance; 0 if more light passes.
@@ -21,7 +21,7 @@ const SIDE: u32 = SORTED_TILE;
 const COLUMN: u32 = 1u;
 
 override tests_depth: bool = false;
-override tells_depth: bool = false;
+override writes_depth: bool = false;
 // True for parallel rays.
 override is_parallel: bool = false;
 // True for a window of 32 splats instead of 16.
@@ -115,8 +115,8 @@ fn load_more(k: u32, slot: u32, s: ProjectedSplat, tile_corner: vec2f) {
 fn start_pixels(pixel: vec2u) -> Pixel {
   if (any(vec2f(pixel) >= view.viewport)) { return Pixel(vec3f(0.0), 1.0, FINISHED); }
   let margin = MARGIN_OCTAVES << OCTAVE_BITS;
-  first_depth = max(~gathered[NEAREST_INVERTED], margin) - margin;
-  let range = max(gathered[FARTHEST] + margin, first_depth) - first_depth;
+  first_depth = max(~cull_stats[NEAREST_INVERTED], margin) - margin;
+  let range = max(cull_stats[FARTHEST] + margin, first_depth) - first_depth;
   step_bits = max(32u - min(countLeadingZeros(range), 32u), DEPTH_BITS) - DEPTH_BITS;
   if (tests_depth) {
     own_texel = scene_texel(vec2f(pixel) + 0.5);
@@ -265,7 +265,7 @@ fn blend_one(pixel: ptr<function, Pixel>, key: u32, color: u32) {
   if (!refuses_last) { refuses = remaining <= REFUSED || are_finished(*pixel); }
   (*pixel).least = select((*pixel).least, FINISHED, ends);
   let after = select(remaining, before, refuses);
-  if (tells_depth && before > 0.5 && after <= 0.5) { half_depth = depth_of(key); }
+  if (writes_depth && before > 0.5 && after <= 0.5) { half_depth = depth_of(key); }
   (*pixel).color += select(full_weight, 0.0, refuses) * shared_exponent_color(color);
   (*pixel).transmittance = after;
 }
@@ -346,9 +346,9 @@ fn finish_pixels(pixel: ptr<function, Pixel>, position: vec2u) {
     blend_four(pixel, window_7);
   }
   while (passed < layers) { blend_layer(pixel); }
-  if (tells_depth) { textureStore(median_depth, position, vec4f(half_depth)); }
+  if (writes_depth) { textureStore(median_depth, position, vec4f(half_depth)); }
   store_pixel(position, (*pixel).color, (*pixel).transmittance);
 }
 
-fn clear_notes(lane: u32) {}
-fn keep_notes(k: u32) {}
+fn aux_clear(lane: u32) {}
+fn aux_store(k: u32) {}

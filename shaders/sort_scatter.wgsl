@@ -1,6 +1,6 @@
 // Last third: moves every key to its place. Within a block keys are ranked 256 at a time by a bitmap for each digit,
 // which needs no subgroups, keeps equal digits in order (stable), and waits for no other workgroup.
-#import shared/sort_places
+#import shared/sort_offsets
 
 const WORDS = SORT_THREADS / 32u;
 

@@ -7,12 +7,12 @@ import { drawn, rounded } from './second.js';
  * Draws one view until nothing more comes, or its time is up: a pool that is too small for a view goes on exchanging pages for a while.
  * @returns seconds taken, and pages on their way at the end: 0 if the view has all that it gets
  */
-async function settle({ device, viewpoint, scene, target, turn, progress, settleSeconds }, camera, levers) {
+async function settle({ device, viewpoint, scene, target, turn, progress, settleSeconds }, camera, settings) {
   const start = performance.now();
   const took = () => (performance.now() - start) / 1000;
   for (let calm = 0; calm < 20 && took() < Math.min(settleSeconds, progress.left);) {
     const { resident } = scene.progress;
-    viewpoint.draw(camera, { target }, levers);
+    viewpoint.draw(camera, { target }, settings);
     await drawn(device);
     await turn();
     calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
@@ -38,19 +38,19 @@ function psnr(a, b) {
  * @param views gets a row for each
  */
 export async function compare(all, shares, views) {
-  const { manifest, width, height, levers, progress } = all;
-  const { detail, splatBudget } = levers;
+  const { manifest, width, height, settings, progress } = all;
+  const { detail, splatBudget } = settings;
   for (const share of shares) {
     if (progress.left === 0) throw new Error('the time was up');
     const camera = flightCamera(share, { bounds: manifest.bounds, width, height });
     progress.begin(`the view at ${share} of the flight`);
-    const settled = await settle(all, camera, levers);
+    const settled = await settle(all, camera, settings);
     const picture = await readPixels(all.device, all.target);
     const { visible, budgetError } = await all.viewpoint.statistics();
     const { resident, error } = all.scene.progress;
     const rest = { resident, poolError: rounded(error) };
     progress.begin(`the view at ${share} of the flight, four times finer`);
-    const finerSettled = await settle(all, camera, { ...levers, detail: detail / 4, splatBudget: 4 * splatBudget });
+    const finerSettled = await settle(all, camera, { ...settings, detail: detail / 4, splatBudget: 4 * splatBudget });
     const finer = await readPixels(all.device, all.target);
     const more = await all.viewpoint.statistics();
     views.push({

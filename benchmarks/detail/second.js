@@ -64,7 +64,7 @@ export class Second {
   #camera;
   #before;
 
-  /** @param all with the device, the viewpoint, the scene, the target, `levers` of each frame and the traffic of files */
+  /** @param all with the device, the viewpoint, the scene, the target, `settings` of each frame and the traffic of files */
   constructor(all, timer) {
     this.#all = all;
     this.#timer = timer;
@@ -77,9 +77,9 @@ export class Second {
 
   /** Draws a frame, and waits until less than {@link IN_FLIGHT} are left to draw. */
   async draw(camera) {
-    const { device, viewpoint, scene, target, levers } = this.#all;
+    const { device, viewpoint, scene, target, settings } = this.#all;
     const begun = performance.now();
-    viewpoint.draw(camera, { target, timer: this.#timer }, levers);
+    viewpoint.draw(camera, { target, timer: this.#timer }, settings);
     this.#encoding.push(performance.now() - begun);
     this.#bytes = Math.max(this.#bytes, scene.byteLength + viewpoint.byteLength);
     if (this.#camera) {

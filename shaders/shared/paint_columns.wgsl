@@ -56,7 +56,7 @@ fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, least_power: f32) 
   (*pixels).green += weight * red_green.y;
   (*pixels).blue += weight * bitcast<f32>(paint.w);
   (*pixels).light = after;
-  note_blend(k, weight, (*pixels).transmittance, after, is_blended);
+  aux_blend(k, weight, (*pixels).transmittance, after, is_blended);
   (*pixels).transmittance = select((*pixels).transmittance, after, is_blended);
 }
 
@@ -82,7 +82,7 @@ fn finish_pixels(pixels: ptr<function, Pixels>, position: vec2u) {
   for (var row = 0u; row < COLUMN; row++) {
     let pixel = position + vec2u(0u, row);
     if (any(vec2f(pixel) >= view.viewport)) { break; }
-    note_pixel(pixel, row);
+    aux_pixel(pixel, row);
     store_pixel(pixel, vec3f((*pixels).red[row], (*pixels).green[row], (*pixels).blue[row]), (*pixels).transmittance[row]);
   }
 }

@@ -117,7 +117,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   loop {
     for (var i = lane; i < BLOCKS * BATCH_WORDS; i += TILE_THREADS) { atomicStore(&block_hits[i], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
-    clear_notes(lane);
+    aux_clear(lane);
     workgroupBarrier();
     let count = load_batch(&list, BATCH, tile_in_bin, vec2f(corner), lane);
     if (count == 0u) { break; }
@@ -127,7 +127,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (!are_finished(pixels)) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
 
-    if (lane < count) { keep_notes(lane); }
+    if (lane < count) { aux_store(lane); }
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }

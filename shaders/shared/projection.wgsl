@@ -4,7 +4,7 @@
 #import shared/gaussian
 #import shared/falloff
 #import shared/ellipse
-#import shared/gathered
+#import shared/cull_stats
 
 // Variance that the low-pass filter of 3D Gaussian Splatting adds, in px² of the displayed frame.
 const DILATION = 0.3;

@@ -7,7 +7,7 @@ import {
   folderSource,
   MOST_UPLOAD_BYTES,
   UPLOAD_SHARE,
-  UploadPace,
+  UploadBudget,
 } from '@gaussian-splat/renderer/stages';
 import { detailFolder } from '../support/detail-folder.js';
 import { FlightPages } from '../support/flight-pages.js';
@@ -125,7 +125,7 @@ function paced(
   intervalOf: (frame: number, bytes: number) => number,
   msPerMegabyte: number,
 ): { bytes: number; share: number }[] {
-  const pace = new UploadPace();
+  const pace = new UploadBudget();
   let [now, last] = [0, 0];
   return Array.from({ length: frames }, (_, frame) => {
     now += intervalOf(frame, last);
@@ -158,7 +158,7 @@ test('a frame that comes late halves the share, one after a rest does not, and o
   close(late[60].share, Math.max(UPLOAD_SHARE.least, late[59].share / 2));
   const rested = paced(61, (frame) => (frame === 60 ? 1000 : interval), 1);
   assert.equal(rested[60].share, rested[59].share);
-  const lazy = new UploadPace();
+  const lazy = new UploadBudget();
   for (let frame = 0; frame < 100; frame++) {
     lazy.startFrame(interval * frame);
     lazy.note(65_536, 0.1);
@@ -177,7 +177,7 @@ test('where uploads above 4 MB make a display leave a frame out, few are, and mo
 
 test('a clock that ticks once a millisecond gives the same share on average', () => {
   const interval = 1000 / 60;
-  const pace = new UploadPace();
+  const pace = new UploadBudget();
   let [now, uploaded, allowed] = [0, 0, 0];
   for (let frame = 0; frame < 600; frame++) {
     const bytes = pace.startFrame(interval * frame);

@@ -6,7 +6,7 @@ import {
   MOST_UNDER_WAY,
   NONE,
   SLOT_CHUNKS,
-  PageTraffic,
+  PageStreamer,
   Residency,
   type PageList,
 } from '@gaussian-splat/renderer/stages';
@@ -169,7 +169,7 @@ test('what is under way is bounded in slots, not in pages', async () => {
   const residency = opened(list, 2000);
   const open: (() => void)[] = [];
   const sent: number[] = [];
-  const traffic = new PageTraffic(residency, {
+  const traffic = new PageStreamer(residency, {
     fetch: (page) => {
       sent.push(page);
       const words = new Uint32Array(1);

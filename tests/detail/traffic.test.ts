@@ -10,7 +10,7 @@ import {
   MOST_UNDER_WAY,
   NONE,
   SLOT_CHUNKS,
-  PageTraffic,
+  PageStreamer,
   Residency,
   type PageList,
 } from '@gaussian-splat/renderer/stages';
@@ -50,7 +50,7 @@ class Server {
 interface Pool {
   readonly list: PageList;
   readonly residency: Residency;
-  readonly traffic: PageTraffic<Uint32Array>;
+  readonly traffic: PageStreamer<Uint32Array>;
   readonly server: Server;
   readonly errors: unknown[];
   /** Pages that were said to wait for their upload. */
@@ -66,7 +66,7 @@ function pool(pages: number, slots: number, below = 16, now?: () => number): Poo
   residency.settle(0);
   const [server, errors] = [new Server(), [] as unknown[]];
   let arrivals = 0;
-  const traffic = new PageTraffic(residency, {
+  const traffic = new PageStreamer(residency, {
     fetch: server.fetch,
     onArrival: () => {
       arrivals++;

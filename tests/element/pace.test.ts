@@ -2,10 +2,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
-import { DisplayInterval } from '../../packages/element/src/pace/display-interval.js';
-import { LADDER } from '../../packages/element/src/pace/ladder.js';
-import { keepPace } from '../../packages/element/src/pace/pace.js';
-import { INITIAL_PACE } from '../../packages/element/src/pace/start.js';
+import { DisplayInterval } from '../../packages/element/src/dynamic-quality/display-interval.js';
+import { QUALITY_LEVELS } from '../../packages/element/src/dynamic-quality/quality-levels.js';
+import { nextQuality } from '../../packages/element/src/dynamic-quality/next-quality.js';
+import { INITIAL_QUALITY } from '../../packages/element/src/dynamic-quality/start.js';
 import { COSTS, LEVELS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
 const LOWEST = COSTS.length - 1;
@@ -231,12 +231,12 @@ test('when the load is gone the whole image comes back within a second, without 
 test('a level that costs more than the ladder says is tried again once in two minutes', () => {
   // The first level down makes the frame more than twice as fast, though the ladder promises less.
   const targetMs = 13.3;
-  let pace = INITIAL_PACE;
+  let pace = INITIAL_QUALITY;
   const changes: number[] = [];
   for (let now = 0; now < 600_000; now += 16.7) {
     const { level } = pace;
     const milliseconds = targetMs * (level === 0 ? 1.3 : 0.5);
-    pace = keepPace(pace, { now, level, milliseconds }, { targetMs, levels: LEVELS });
+    pace = nextQuality(pace, { now, level, milliseconds }, { targetMs, levels: LEVELS });
     if (pace.level === 0 && level > 0) changes.push(now);
   }
   assert.ok(changes.length >= 3 && changes.length <= 5, changes.join(' '));
@@ -249,26 +249,26 @@ test('a level that costs more than the ladder says is tried again once in two mi
 
 test('frames that took next to nothing do not keep belief low: slow ones are answered within a second and a half', () => {
   const rules = { targetMs: 13, levels: LEVELS };
-  let pace = INITIAL_PACE;
+  let pace = INITIAL_QUALITY;
   let now = 0;
   // Past a corner of the scene, with nothing in sight.
-  for (; now < 2_000; now += 16) pace = keepPace(pace, { now, level: pace.level, milliseconds: 0.01 }, rules);
+  for (; now < 2_000; now += 16) pace = nextQuality(pace, { now, level: pace.level, milliseconds: 0.01 }, rules);
   const begin = now;
   for (; pace.level === 0 && now < begin + 10_000; now += 60)
-    pace = keepPace(pace, { now, level: pace.level, milliseconds: 60 }, rules);
+    pace = nextQuality(pace, { now, level: pace.level, milliseconds: 60 }, rules);
   assert.ok(now - begin < 1_500, `answered after ${now - begin} ms`);
 });
 
 test('frames of another level say nothing', () => {
-  const pace = { ...INITIAL_PACE, level: 3 };
-  assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, levels: LEVELS }), pace);
+  const pace = { ...INITIAL_QUALITY, level: 3 };
+  assert.equal(nextQuality(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, levels: LEVELS }), pace);
 });
 
 test('what the true image took at rest is what the pace comes back to where less takes longer', () => {
   const targetMs = 13.3;
-  let [pace, now] = [INITIAL_PACE, 0];
+  let [pace, now] = [INITIAL_QUALITY, 0];
   const draw = (level: number, milliseconds: number): void => {
-    pace = keepPace(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, levels: LEVELS });
+    pace = nextQuality(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, levels: LEVELS });
   };
   const move = (seconds: number, shares: readonly number[], load: number): void => {
     for (const end = now + 1000 * seconds; now < end;) draw(pace.level, targetMs * load * shares[pace.level]);
@@ -293,9 +293,9 @@ test('what the true image took at rest is what the pace comes back to where less
 });
 
 test("the element's levels: the whole image, then others by their names, whose scale is the one that is drawn", () => {
-  assert.deepEqual([LADDER[0].levers, LADDER[0].scale], [undefined, 1]);
-  assert.equal(new Set(LADDER.map(({ name }) => name)).size, LADDER.length);
-  for (const { levers, scale } of LADDER.slice(1)) assert.equal(levers?.resolutionScale ?? 1, scale);
+  assert.deepEqual([QUALITY_LEVELS[0].settings, QUALITY_LEVELS[0].scale], [undefined, 1]);
+  assert.equal(new Set(QUALITY_LEVELS.map(({ name }) => name)).size, QUALITY_LEVELS.length);
+  for (const { settings, scale } of QUALITY_LEVELS.slice(1)) assert.equal(settings?.resolutionScale ?? 1, scale);
 });
 
 test('the display: refresh rates are found among late frames, and slow frames are not taken for a slow display', () => {

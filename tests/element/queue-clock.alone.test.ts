@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test, type TestContext } from 'node:test';
 import { QueueClock, type WorkTime } from '@gaussian-splat/renderer/tools';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
-import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
+import { DynamicQualityController } from '../../packages/element/src/controllers/dynamic-quality-controller.js';
 import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import { LEVELS } from '../support/pace-gpu.js';
 
@@ -164,13 +164,13 @@ test('a frame that is told of late, since the thread was busy, took something be
 /** Turns for three seconds. @returns the level at the end */
 async function turn(page: Page, work: number, looks = 0, onFrame: () => void = () => undefined): Promise<string> {
   const clock = await page.clock();
-  const pace = new PaceController({
+  const pace = new DynamicQualityController({
     isOn: () => true,
     scheduler: () => ({ displayInterval: INTERVAL, clients: 1 }) as FrameScheduler,
     frameBudget: () => Infinity,
     requestFrame: () => undefined,
     mayFade: () => true,
-    onPace: () => undefined,
+    onFrameTimed: () => undefined,
     levels: LEVELS,
   });
   let flying = 0;
@@ -182,7 +182,7 @@ async function turn(page: Page, work: number, looks = 0, onFrame: () => void = (
       flying++;
       void clock
         .time(() => {
-          const share = (plan.levers?.resolutionScale ?? 1) ** 2;
+          const share = (plan.settings?.resolutionScale ?? 1) ** 2;
           page.work(work * share, looks * share);
         })
         .then((time) => {

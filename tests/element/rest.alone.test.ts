@@ -3,14 +3,14 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { DetailController } from '../../packages/element/src/controllers/detail-controller.js';
 import {
-  PaceController,
+  DynamicQualityController,
   type FramePlan,
-  type PaceOptions,
-} from '../../packages/element/src/controllers/pace-controller.js';
+  type DynamicQualityOptions,
+} from '../../packages/element/src/controllers/dynamic-quality-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
 import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
-import { waitForRest } from '../../packages/element/src/pace/start.js';
+import { waitForRest } from '../../packages/element/src/dynamic-quality/start.js';
 import { COSTS, LEVELS } from '../support/pace-gpu.js';
 
 const INTERVAL = 1000 / 60;
@@ -18,21 +18,25 @@ const PIXELS = 1e6;
 const display = { displayInterval: INTERVAL, clients: 1 } as FrameScheduler;
 
 /** A controller that is on, alone on its display, and goes by that; but for what a test says. */
-const paceOf = (options: Partial<PaceOptions> = {}): PaceController =>
-  new PaceController({
+const paceOf = (options: Partial<DynamicQualityOptions> = {}): DynamicQualityController =>
+  new DynamicQualityController({
     isOn: () => true,
     scheduler: () => display,
     frameBudget: () => Infinity,
     requestFrame: () => undefined,
     mayFade: () => true,
-    onPace: () => undefined,
+    onFrameTimed: () => undefined,
     levels: LEVELS,
     ...options,
   });
 
 /** What a frame took that began at a time, known exactly. */
-const took = (pace: PaceController, plan: Pick<FramePlan, 'level' | 'size'>, milliseconds: number, now: number): void =>
-  pace.sample(plan, { doneAt: now + milliseconds, atLeast: milliseconds, atMost: milliseconds });
+const took = (
+  pace: DynamicQualityController,
+  plan: Pick<FramePlan, 'level' | 'size'>,
+  milliseconds: number,
+  now: number,
+): void => pace.sample(plan, { doneAt: now + milliseconds, atLeast: milliseconds, atMost: milliseconds });
 
 for (const wholeMs of [20, 100, 200, 214]) {
   test(`a true image of ${wholeMs} ms is on show 300 ms after rest, and not begun before 50 ms`, (context) => {
@@ -166,7 +170,7 @@ test('pictures that are small already are not made smaller, whatever they take',
     }
     return pace.plan({ now: 3000, pixels, hasChanged: true, goesOn: true }).level;
   };
-  const scaleOf = (level: number): number => LEVELS[level].levers?.resolutionScale ?? 1;
+  const scaleOf = (level: number): number => LEVELS[level].settings?.resolutionScale ?? 1;
   for (const side of [32, 128, 256, 1024]) {
     pace.reset();
     const scale = scaleOf(levelOf(side ** 2));
@@ -333,7 +337,7 @@ test('levels of detail are built once pictures have moved slowly for 1.5 s, rest
   const move = async (milliseconds: number, isWhole = false): Promise<number> => {
     for (let spent = 0; spent < milliseconds; spent += 50) {
       pass(50);
-      detail.notePace(isWhole);
+      detail.reportMotionFrame(isWhole);
     }
     // They are built by a module of their own.
     await import('../../packages/element/src/detail/build-levels.js');

@@ -14,7 +14,7 @@ const columnMajor = Array.from({ length: 16 }, (_, k) => camera.worldToCamera[4 
 const flat = Array.from(camera.worldToCamera, (x, k) => (k >= 4 && k < 8 ? camera.worldToCamera[k - 4] : x));
 
 const FAULTY: readonly (readonly [name: string, changes: object, code: string])[] = [
-  ['levers that are null', { settings: null }, 'argument/value'],
+  ['settings that are null', { settings: null }, 'argument/value'],
   ['a background of three numbers', { background: [0, 0, 0] }, 'argument/value'],
   ['a background that is not a number', { background: [0, 0, NaN, 1] }, 'argument/value'],
   ['a matrix of columns', { camera: { ...camera, worldToCamera: columnMajor } }, 'argument/camera'],

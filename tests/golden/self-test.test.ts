@@ -1,7 +1,7 @@
 /** The self-test finds a GPU that computes wrongly, whichever stage it is: stages are broken on purpose, one after another. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
+import { passesSelfTest } from '@gaussian-splat/renderer/stages';
 import { autotune, type RasterizerName } from '@gaussian-splat/renderer';
 import { faultsOf, type Threads } from '@gaussian-splat/renderer/tools';
 import { isLab } from '../support/extent.js';
@@ -47,8 +47,8 @@ const MUTANTS: readonly Mutant[] = [
   {
     what: 'the nearest depth is not found',
     shader: /gs.cull$/,
-    from: 'atomicMax(&gathered[NEAREST_INVERTED], atomicLoad(&nearest_inverted))',
-    to: 'atomicMax(&gathered[NEAREST_INVERTED], 0u)',
+    from: 'atomicMax(&cull_stats[NEAREST_INVERTED], atomicLoad(&nearest_inverted))',
+    to: 'atomicMax(&cull_stats[NEAREST_INVERTED], 0u)',
     threads: 'parallel',
   },
   {
@@ -219,7 +219,7 @@ for (const { what, threads = 'serial', rasterizer = 'quads', ...fault } of isLab
   : [...quick, ...slow.filter(({ shader }) => shader.source.includes('sort_scan')).slice(0, 1)]) {
   test(`found by the self-test: ${what}`, async () => {
     const { device, befallen } = miscompiling(await nodeDevice(), [fault]);
-    assert.equal(await givesKnownAnswer(device, { threads, rasterizer }), false);
+    assert.equal(await passesSelfTest(device, { threads, rasterizer }), false);
     assert.ok(befallen.length > 0, `${fault.shader.source} has "${fault.from}"`);
   });
 }
@@ -243,7 +243,7 @@ test('the self-test passes where nothing is broken, in a few milliseconds', asyn
   const times = [];
   for (let i = 0; i < 4; i++) {
     const start = performance.now();
-    assert.ok(await givesKnownAnswer(device, { threads: 'serial', rasterizer: 'quads' }));
+    assert.ok(await passesSelfTest(device, { threads: 'serial', rasterizer: 'quads' }));
     times.push(performance.now() - start);
   }
   console.log(`self-test: first ${times[0].toFixed(0)} ms, then ${Math.min(...times.slice(1)).toFixed(1)} ms`);

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as delay } from 'node:timers/promises';
 import { autotune, GaussianBuffers, packGaussians, startVariants, type Variants } from '@gaussian-splat/renderer';
-import { givesKnownAnswer, mortonOrder, packSpheres, ROUNDS, sphereCloud } from '@gaussian-splat/renderer/stages';
+import { passesSelfTest, mortonOrder, packSpheres, ROUNDS, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull, onlyInLab } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
@@ -30,11 +30,11 @@ test('every variant gives the known answer, and a wrong rule does not', async ()
   const device = await nodeDevice();
   for (const threads of ['parallel', 'serial'] as const) {
     for (const rasterizer of ['quads', 'tiles'] as const) {
-      assert.ok(await givesKnownAnswer(device, { threads, rasterizer }), `${threads} ${rasterizer}`);
+      assert.ok(await passesSelfTest(device, { threads, rasterizer }), `${threads} ${rasterizer}`);
     }
   }
-  assert.equal(await givesKnownAnswer(device, { shDegree: 0 }), false, 'no view-dependent colour');
-  assert.equal(await givesKnownAnswer(device, { resolutionScale: 0.5 }), false, 'half the pixels');
+  assert.equal(await passesSelfTest(device, { shDegree: 0 }), false, 'no view-dependent colour');
+  assert.equal(await passesSelfTest(device, { resolutionScale: 0.5 }), false, 'half the pixels');
 });
 
 test('the spheres that variants are judged by are packed as files are', () => {
@@ -211,7 +211,7 @@ const newDevice = async (): Promise<GPUDevice> => (await requestNodeAdapter()).r
 
 /** On SwiftShader one choice is right. Elsewhere measuring decides, and may decide differently the next time, but never for what draws another picture. */
 async function assertSuits(device: GPUDevice, chosen: Variants): Promise<void> {
-  assert.ok(await givesKnownAnswer(device, chosen), JSON.stringify(chosen));
+  assert.ok(await passesSelfTest(device, chosen), JSON.stringify(chosen));
   if (!isSwiftShader(device)) return;
   assert.equal(chosen.rasterizer, 'quads', 'tiles are no choice for SwiftShader');
   assert.equal(chosen.threads, 'serial', 'nor are barriers');

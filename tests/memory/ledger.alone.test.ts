@@ -81,10 +81,10 @@ test('what is soon not needed any more is given back before anybody is refused, 
     const reservation = ledger.reserve(name, 20);
     const giveBack = (): void => {
       given.push(name);
-      ledger.spare.delete(giveBack);
+      ledger.releasable.delete(giveBack);
       reservation.release();
     };
-    ledger.spare.set(giveBack, 0);
+    ledger.releasable.set(giveBack, 0);
   }
   ledger.reserve('beside', 20);
   assert.deepEqual(given, []);

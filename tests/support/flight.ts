@@ -4,10 +4,10 @@ import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
   aheadMs,
   CameraMotion,
-  PageTraffic,
+  PageStreamer,
   Residency,
   SLOT_CHUNKS,
-  UploadPace,
+  UploadBudget,
 } from '@gaussian-splat/renderer/stages';
 import { setImmediate as turn } from 'node:timers/promises';
 import { benchModule } from '../bench/load.js';
@@ -115,7 +115,7 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
   const residency = new Residency(list, options.slots, (page) => files.has(nameOf(page)));
   residency.begin(0);
   residency.settle(0);
-  const traffic = new PageTraffic(residency, {
+  const traffic = new PageStreamer(residency, {
     fetch: async (page, signal) => {
       const name = nameOf(page);
       await files.read(name, () => server.fetch(parseInt(name)), signal);
@@ -127,7 +127,7 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
     },
     now: () => server.now,
   });
-  const [pace, motion] = [new UploadPace(), new CameraMotion()];
+  const [pace, motion] = [new UploadBudget(), new CameraMotion()];
   const rows: FlightSecond[] = [];
   let look: { readonly requests: Float32Array; readonly frame: number } | undefined;
   let [sum, placed, turned] = [0, 0, 0];
@@ -164,8 +164,8 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
 
 function upload(
   residency: Residency,
-  traffic: PageTraffic<Uint32Array>,
-  pace: UploadPace,
+  traffic: PageStreamer<Uint32Array>,
+  pace: UploadBudget,
   { now, bytes, uploadMs }: { readonly now: number; readonly bytes: number; readonly uploadMs: number },
 ): number {
   const most = pace.startFrame(now);

@@ -1,16 +1,16 @@
 /** Simulated GPUs under the pace of moving pictures, and what is asked of the levels that it chose. */
-import type { Level } from '../../packages/element/src/pace/ladder.js';
-import { keepPace } from '../../packages/element/src/pace/pace.js';
-import { quantile } from '../../packages/element/src/pace/display-interval.js';
-import { INITIAL_PACE, type Pace } from '../../packages/element/src/pace/start.js';
+import type { QualityLevel } from '../../packages/element/src/dynamic-quality/quality-levels.js';
+import { nextQuality } from '../../packages/element/src/dynamic-quality/next-quality.js';
+import { quantile } from '../../packages/element/src/dynamic-quality/display-interval.js';
+import { INITIAL_QUALITY, type QualityState } from '../../packages/element/src/dynamic-quality/start.js';
 import { randomSource } from './gpu.js';
 
 /** Levels that do not change with the element's. */
-export const LEVELS: readonly Level[] = [
-  { name: 'whole', levers: undefined, scale: 1 },
+export const LEVELS: readonly QualityLevel[] = [
+  { name: 'whole', settings: undefined, scale: 1 },
   ...[1, 1, 0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25].map((scale, i) => ({
     name: `level ${i + 1}`,
-    levers: { resolutionScale: scale },
+    settings: { resolutionScale: scale },
     scale,
   })),
 ];
@@ -45,18 +45,18 @@ export interface Frame {
 }
 
 /** Draws a moving picture for so long: a frame begins with a picture of the display, once the GPU has at most one frame to do. */
-export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pace; targetMs: number } {
+export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: QualityState; targetMs: number } {
   const interval = 1000 / gpu.hertz;
   const targetMs = 0.8 * interval;
   const random = randomSource(gpu.seed);
   const frames: Frame[] = [];
   const waiting: { due: number; at: number; level: number; spent: number }[] = [];
-  let pace = INITIAL_PACE;
+  let pace = INITIAL_QUALITY;
   let free = 0;
   for (let at = 0; at < milliseconds; at += interval) {
     while (waiting.length > 0 && waiting[0].due <= at) {
       const { due, level, spent } = waiting.shift()!;
-      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, levels: LEVELS });
+      pace = nextQuality(pace, { now: due, level, milliseconds: spent }, { targetMs, levels: LEVELS });
     }
     if (gpu.moves?.(at) === false || free > at + interval) continue;
     const { level } = pace;

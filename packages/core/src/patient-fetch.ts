@@ -2,20 +2,20 @@
  * Milliseconds without a response after which a server is abandoned, and a connection with less than 1 KiB counts as
  * broken.
  */
-export const PATIENCE_MS = 30_000;
-const PATIENCE_BYTES = 1024;
+export const SILENCE_MS = 30_000;
+const SILENCE_BYTES = 1024;
 
 /** A server or connection that sent too little data within {@link PATIENCE_MS}. */
 export class SilenceError extends Error {
   constructor() {
-    super(`nothing came for ${PATIENCE_MS / 1000} s`);
+    super(`nothing came for ${SILENCE_MS / 1000} s`);
   }
 }
 
 /** Same as `fetch`, but also rejects with a {@link SilenceError} if no headers arrive in time. */
 export async function fetchPatiently(url: string | URL, { signal, ...init }: RequestInit = {}): Promise<Response> {
   const silence = new AbortController();
-  const timer = setTimeout(() => silence.abort(new SilenceError()), PATIENCE_MS);
+  const timer = setTimeout(() => silence.abort(new SilenceError()), SILENCE_MS);
   const either = signal ? AbortSignal.any([signal, silence.signal]) : silence.signal;
   try {
     return await fetch(url, { ...init, signal: either });
@@ -40,13 +40,13 @@ export async function* chunksOf(
   try {
     while (reader) {
       const start = performance.now();
-      const { done, value } = await inTime(reader.read(), PATIENCE_MS - waited).catch((cause: unknown) => {
+      const { done, value } = await inTime(reader.read(), SILENCE_MS - waited).catch((cause: unknown) => {
         throw failed(cause);
       });
       if (done) return;
       waited += performance.now() - start;
       arrived += value.length;
-      if (arrived >= PATIENCE_BYTES) [waited, arrived] = [0, 0];
+      if (arrived >= SILENCE_BYTES) [waited, arrived] = [0, 0];
       yield value;
     }
   } finally {

@@ -16,7 +16,7 @@ export type {
 } from './events.js';
 export { GaussianSplatElement } from './element.js';
 export type { SceneStats } from './stats.js';
-export type { DynamicQualityReport } from './controllers/pace-controller.js';
+export type { DynamicQualityReport } from './controllers/dynamic-quality-controller.js';
 export type { SettableProperties } from './media.js';
 export type { ImageOptions } from './viewing.js';
 export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './views/camera-view.js';

@@ -225,9 +225,9 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     if (this.member && !this.scene.isOutgoing) this.live.advance(this.member.scene, this.#seenFrom(camera), now);
   }
 
-  notePace(isWhole: boolean): void {
+  reportMotionFrame(isWhole: boolean): void {
     if (!isWhole) this.#detail.want(this.#warnOf);
-    this.#detail.value?.notePace(isWhole);
+    this.#detail.value?.reportMotionFrame(isWhole);
   }
 
   // What the controllers ask.

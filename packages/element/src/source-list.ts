@@ -8,7 +8,7 @@ import type { ElementError } from './errors.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
-import type { DetailLevers, Drawable } from './gpu/painter.js';
+import type { LodSettings, Drawable } from './gpu/painter.js';
 import { Member } from './member.js';
 import type { EntryList, SourceEntry } from './source-entry.js';
 
@@ -220,8 +220,8 @@ export class SourceList implements EntryList {
     return this.#all.some(({ scene }) => scene.isPreview);
   }
 
-  get levels(): DetailLevers {
-    const most = (of: (levers: DetailLevers) => number | undefined): number =>
+  get levels(): LodSettings {
+    const most = (of: (settings: LodSettings) => number | undefined): number =>
       Math.max(0, ...this.members.map(({ scene }) => of(scene.detail) ?? 0));
     return { detail: most(({ detail }) => detail), splatBudget: most(({ splatBudget }) => splatBudget) };
   }
@@ -283,8 +283,8 @@ export class SourceList implements EntryList {
     for (const entry of this.#all) entry.startPlaying();
   }
 
-  notePace(isWhole: boolean): void {
-    for (const entry of this.#all) entry.notePace(isWhole);
+  reportMotionFrame(isWhole: boolean): void {
+    for (const entry of this.#all) entry.reportMotionFrame(isWhole);
   }
 
   /** They may be loaded, or play, now. */

@@ -23,7 +23,7 @@ import { isGone } from './gpu/device-failures.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
-import type { DetailLevers, Drawable, ReadCounts } from './gpu/painter.js';
+import type { LodSettings, Drawable, ReadCounts } from './gpu/painter.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { Frame } from './live/frame-filter.js';
 import type { GeneratorInput } from './live/inputs.js';
@@ -371,7 +371,7 @@ export class Stage
     return this.sources.shown;
   }
 
-  get levels(): DetailLevers {
+  get levels(): LodSettings {
     return this.sources.levels;
   }
 
@@ -441,8 +441,8 @@ export class Stage
     this.element.requestUpdate();
   }
 
-  notePace(isWhole: boolean): void {
-    this.sources.notePace(isWhole);
+  reportMotionFrame(isWhole: boolean): void {
+    this.sources.reportMotionFrame(isWhole);
   }
 
   drawingFailed(error: unknown): void {

@@ -1,7 +1,7 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { faultsOf } from '@gaussian-splat/renderer/tools';
 import type { QualityChoice } from './attributes.js';
-import type { DynamicQualityReport } from './controllers/pace-controller.js';
+import type { DynamicQualityReport } from './controllers/dynamic-quality-controller.js';
 import type { SceneState } from './controllers/scene-controller.js';
 import type { ElementError } from './errors.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
@@ -123,7 +123,7 @@ export function statsOf(
       ...whyPreview(isPreview),
       ...whyDropped(dropped),
       ...whyDetail(quality, detail),
-      ...whyPace(quality, dynamicQuality),
+      ...explainQuality(quality, dynamicQuality),
       ...whyFewPixels(pixelShare),
       ...whyLeft(counts?.left ?? 0),
       ...faultsOf(scenes[0].place.context),
@@ -155,7 +155,7 @@ function whyLeft(left: number): string[] {
   return left > 0 ? [`${left} splats are not drawn: the GPU allows no buffer that holds more of them.`] : [];
 }
 
-function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: DynamicQualityReport): string[] {
+function explainQuality(quality: QualityChoice, { moving, frameMs, targetMs }: DynamicQualityReport): string[] {
   if (quality !== 'auto') return quality === 'default' ? [] : [`The page asks for quality="${quality}".`];
   if (moving === 'whole') return [];
   const found = frameMs === null ? '' : `; the last took ${frameMs.toFixed(1)} ms`;

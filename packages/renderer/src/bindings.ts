@@ -53,7 +53,7 @@ interface PageBindings {
 interface BudgetBindings {
   readonly stages: DetailBudget;
   readonly count: readonly GPUBindGroup[];
-  readonly allow: GPUBindGroup;
+  readonly threshold: GPUBindGroup;
 }
 
 /** Resources for {@link FrameBindings}. */
@@ -111,13 +111,13 @@ function bindBudget(
       count: table.pages.map(({ chunks, details = chunks }, i) =>
         stages.count.bind({ view: table.view(i), chunks, details, detail_counts }),
       ),
-      allow: stages.allow.bind({ view: table.view(0), detail_counts, chunk_shares: chunkShares }),
+      threshold: stages.threshold.bind({ view: table.view(0), detail_counts, chunk_shares: chunkShares }),
     }
   );
 }
 
 function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBindings[] {
-  const { chunkShares, visibleBits, groupOffsets, gathered, plan, splats, keys, order } = scratch;
+  const { chunkShares, visibleBits, groupOffsets, cullStats, plan, splats, keys, order } = scratch;
   // The sort needs its first order buffer only after `project` has read the survivors from it.
   const survivors = order[0];
   return table.pages.map((page, i) => {
@@ -147,12 +147,12 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
         ...{ ...chunk, ...modifiers },
         gaussians,
         group_counts: groupOffsets,
-        gathered,
+        cull_stats: cullStats,
         chunk_shares: chunkShares,
       }),
       compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
       project: reading.project.bind({
-        ...{ ...modifiers, view, gaussians, sh: page.sh, survivors, plan, gathered, splats },
+        ...{ ...modifiers, view, gaussians, sh: page.sh, survivors, plan, cull_stats: cullStats, splats },
         keys: keys[0],
         chunk_shares: chunkShares,
       }),

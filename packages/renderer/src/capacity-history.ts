@@ -9,12 +9,12 @@ export interface Capacity {
 }
 
 /** Samples with excess capacity before the buffers shrink. */
-const PATIENCE = 4;
+const SAMPLES_BEFORE_SHRINK = 4;
 /**
  * Factor of that number each time the buffers had to grow again: views that alternate, such as those of an orbit, soon
  * keep the largest capacity.
  */
-const PATIENCE_GROWTH = 4;
+const SAMPLES_GROWTH = 4;
 /** Two samples within this time, ms, are taken to show about the same view. */
 const SAME_VIEW_MS = 1_000;
 /**
@@ -56,7 +56,7 @@ interface Ratio {
  * in motion are measured.
  */
 export class CapacityHistory {
-  #looks = PATIENCE;
+  #looks = SAMPLES_BEFORE_SHRINK;
   #hasShrunk = false;
   #whole = { pixels: 0, need: NOTHING };
   #last: CountSample | undefined;
@@ -74,7 +74,7 @@ export class CapacityHistory {
 
   /** Records that the buffers had to grow. */
   grow(): void {
-    if (this.#hasShrunk) this.#looks *= PATIENCE_GROWTH;
+    if (this.#hasShrunk) this.#looks *= SAMPLES_GROWTH;
     this.#hasShrunk = false;
   }
 

@@ -52,7 +52,7 @@ export function initialCapacity(splats: number, most: Capacity, isBudgeted = fal
 
 /** Counts of one frame. */
 export interface FrameCounts extends Capacity {
-  /** `gathered[COVERED]` */
+  /** `cull_stats[COVERED]` */
   readonly covered: number;
 }
 
@@ -156,11 +156,11 @@ export class CapacityMonitor {
   /** Records the copy of the counts to a read-back buffer. */
   record(
     encoder: GPUCommandEncoder,
-    { plan, gathered }: Pick<Scratch, 'plan' | 'gathered'>,
+    { plan, cullStats }: Pick<Scratch, 'plan' | 'cullStats'>,
     pairPlan: GPUBuffer | undefined,
   ): void {
     copyCounts(encoder, plan, pairPlan, this.#staging, 0);
-    encoder.copyBufferToBuffer(gathered, 4 * constants.COVERED, this.#staging, COUNT_BYTES - 4, 4);
+    encoder.copyBufferToBuffer(cullStats, 4 * constants.COVERED, this.#staging, COUNT_BYTES - 4, 4);
     this.#isReading = true;
   }
 

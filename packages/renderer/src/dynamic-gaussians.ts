@@ -6,11 +6,11 @@ import * as layouts from './generated/live-layouts.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import { readPlaces } from './read-places.js';
+import { readSamples } from './read-samples.js';
 import { ingestStage } from './stages/ingest.js';
 import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
 import { cullGroups } from './stages/stage.js';
-import { countBytes, ingestValues, TensorPlaces } from './tensor-places.js';
+import { countBytes, ingestValues, TensorBindings } from './tensor-bindings.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, shWords } from './pack/words.js';
 
 export interface DynamicGaussiansOptions {
@@ -72,7 +72,7 @@ export class DynamicGaussians implements GaussianScene {
   readonly #stage: ReturnType<typeof ingestStage>;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
-  readonly #places: TensorPlaces;
+  readonly #places: TensorBindings;
   readonly #bindings = new Map<string, readonly GPUBindGroup[]>();
   #version = 0;
   #rows = -1;
@@ -92,7 +92,7 @@ export class DynamicGaussians implements GaussianScene {
     this.#stage = ingestStage(device);
     this.#memory = new GpuMemory(device);
     try {
-      this.#places = new TensorPlaces(layout, this.#memory);
+      this.#places = new TensorBindings(layout, this.#memory);
       this.pages = this.#makePages();
     } catch (error) {
       this.destroy();
@@ -171,7 +171,7 @@ export class DynamicGaussians implements GaussianScene {
 
   /** Returns the same sample, with the numbers of its rows. */
   async readSample(): Promise<RowSample> {
-    const places = await readPlaces(this.#device, this.pages);
+    const places = await readSamples(this.#device, this.pages);
     this.#dropped = places.unusable;
     return {
       bounds: boundsOf({ ...places, origin: this.origin }),

@@ -167,10 +167,10 @@ export class FrameResources {
     if (kept === undefined) this.#current?.scratch.destroy();
     const pages = table.pages.length;
     const { visible, pairs } = capacity;
-    const spareBytes = this.#options.rasterizer.spareBytes({ capacity: visible, pairCapacity: pairs });
-    kept?.fitSpare(spareBytes);
+    const pingPongBytes = this.#options.rasterizer.pingPongBytes({ capacity: visible, pairCapacity: pairs });
+    kept?.fitPingPong(pingPongBytes);
     kept?.fitPages(table.groups, pages);
-    const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, spareBytes);
+    const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, pingPongBytes);
     const isSame = kept !== undefined && kept.plan === this.#boundPlan;
     if (!isSame || this.#hasOtherPairs) this.#bindRasterizer(scratch, capacity);
     this.#boundPlan = scratch.plan;
@@ -181,11 +181,11 @@ export class FrameResources {
     return this.#current;
   }
 
-  #bindRasterizer({ plan, splats, order, spare }: Scratch, { visible, pairs }: Capacity): void {
+  #bindRasterizer({ plan, splats, order, pingPong }: Scratch, { visible, pairs }: Capacity): void {
     this.#options.rasterizer.bind({
       plan,
       splats,
-      spare,
+      pingPong,
       order: order[0],
       capacity: visible,
       pairCapacity: pairs,

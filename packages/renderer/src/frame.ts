@@ -12,7 +12,7 @@ export interface Frame {
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
   readonly camera: Camera;
-  readonly levers: FeedbackSettings & Pick<RenderSettings, 'depthKeyBits'>;
+  readonly settings: FeedbackSettings & Pick<RenderSettings, 'depthKeyBits'>;
   /** Whether to list the indices of the visible splats by slot in {@link Scratch.survivors}, for auxiliary outputs. */
   readonly keepsSurvivors: boolean;
   /** Whether a block has levels of detail. */
@@ -35,7 +35,7 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
   const { scratch, bindings, timer } = frame;
   const requests = feedbackDue(frame);
   for (const request of requests) request.begin(encoder);
-  encoder.clearBuffer(scratch.gathered);
+  encoder.clearBuffer(scratch.cullStats);
   if (frame.isBudgeted) encoder.clearBuffer(scratch.detailCounts);
   // Clears the threshold of an earlier budget.
   else if (frame.hasDetail) encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
@@ -59,13 +59,13 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Page
 function keepWithinBudget(pass: GPUComputePassEncoder, { pages, budget }: FrameBindings): void {
   if (!budget) return;
   pages.forEach(({ splatCount }, i) => budget.stages.count.record(pass, budget.count[i], splatCount));
-  budget.stages.allow.record(pass, budget.allow);
+  budget.stages.threshold.record(pass, budget.threshold);
 }
 
 /** Streamed scenes that are due to record page requests in this frame. */
-function feedbackDue({ bindings, camera, levers }: Frame): PageRequests[] {
+function feedbackDue({ bindings, camera, settings }: Frame): PageRequests[] {
   const all = new Set(bindings.pages.flatMap(({ requests }) => (requests ? [requests.of] : [])));
-  return [...all].filter((requests) => requests.isDue(camera, levers));
+  return [...all].filter((requests) => requests.isDue(camera, settings));
 }
 
 function recordFeedback(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly PageRequests[]): void {
@@ -93,8 +93,8 @@ function listSurvivors(pass: GPUComputePassEncoder, { stages, bindings }: Pick<F
 }
 
 /** Sorts the projected splats from near to far; splats of equal depth keep the order of the file. */
-function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, levers, timer }: Frame): void {
+function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, settings, timer }: Frame): void {
   const pass = encoder.beginComputePass({ label: 'gs.sort', timestampWrites: timer?.timestampWrites('sort') });
-  stages.sort.record(pass, bindings.sort(levers.depthKeyBits), scratch.capacity);
+  stages.sort.record(pass, bindings.sort(settings.depthKeyBits), scratch.capacity);
   pass.end();
 }

@@ -37,7 +37,7 @@ export interface PageRequests {
    * Called with the camera and the settings of each frame. Returns true if this frame should record requests; then the
    * other four are called in turn, `note` for each page of the pool, `read` after the submit.
    */
-  isDue(camera: Camera, levers: FeedbackSettings): boolean;
+  isDue(camera: Camera, settings: FeedbackSettings): boolean;
   begin(encoder: GPUCommandEncoder): void;
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
   copy(encoder: GPUCommandEncoder): void;

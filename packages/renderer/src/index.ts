@@ -1,6 +1,6 @@
 export { capture, type CaptureRequest } from './capture.js';
-export { autotune, startVariants, type AutotuneOptions, type StartOptions } from './choice/choose.js';
-export type { AutotuneStore } from './choice/kept-choice.js';
+export { autotune, startVariants, type AutotuneOptions, type StartOptions } from './autotune/autotune.js';
+export type { AutotuneStore } from './autotune/store.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianScene } from './gaussian-scene.js';

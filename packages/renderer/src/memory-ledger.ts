@@ -27,7 +27,7 @@ export class MemoryLedger {
    * Functions that release memory that will soon be unnecessary, called in order until a request fits, with their bytes
    * in off-screen scenes. These are also called if their sum exceeds {@link unseenBytes}.
    */
-  readonly spare = new Map<() => void, number>();
+  readonly releasable = new Map<() => void, number>();
   readonly #held = new Set<Reservation>();
 
   /** Returns the ledger of a device, or of a WebGL context; all its scenes share one. */
@@ -51,7 +51,7 @@ export class MemoryLedger {
   }
 
   get #unseen(): number {
-    return [...this.spare.values()].reduce((sum, bytes) => sum + bytes, 0);
+    return [...this.releasable.values()].reduce((sum, bytes) => sum + bytes, 0);
   }
 
   /**
@@ -69,7 +69,7 @@ export class MemoryLedger {
         remedy: 'hand over the bytes that will be allocated',
       });
     if (bytes > most) throw overBudget(label, bytes, `${inBytes(most)}, the memoryBudget that was given`);
-    for (const [giveBack, unseen] of this.spare) {
+    for (const [giveBack, unseen] of this.releasable) {
       const isScarce = bytes > this.budgetBytes - this.bytes;
       if (isScarce || (unseen && this.#unseen > this.unseenBytes)) giveBack();
     }

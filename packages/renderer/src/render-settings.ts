@@ -151,12 +151,12 @@ export function completed(options: SomeSettings): RenderSettings {
 export function renderSettingsOf(options: SomeSettings): RenderSettings {
   const quality = options.quality ?? 'default';
   if (!Object.hasOwn(QUALITIES, quality)) throw invalid('quality', Object.keys(QUALITIES).join(', '), quality);
-  const levers = completed(options);
-  for (const name of Object.keys(levers) as (keyof RenderSettings)[]) requireInRange(name, levers[name]);
-  if (levers.order === 'pixel' && levers.rasterizer === 'quads') {
+  const settings = completed(options);
+  for (const name of Object.keys(settings) as (keyof RenderSettings)[]) requireInRange(name, settings[name]);
+  if (settings.order === 'pixel' && settings.rasterizer === 'quads') {
     throw invalid('order', "'center' with the rasterizer quads: 'pixel' takes tiles", 'pixel');
   }
-  return levers;
+  return settings;
 }
 
 /** @throws GaussianSplatError `argument/value` for a value that its setting does not accept. */

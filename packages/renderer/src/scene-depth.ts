@@ -110,7 +110,7 @@ export class SceneDepth implements PaintingDepth {
 
   get overrides(): Overrides {
     const { layers } = this;
-    return { tests_depth: +(this.#host !== undefined), tells_depth: +(this.#outTexture !== undefined), layers };
+    return { tests_depth: +(this.#host !== undefined), writes_depth: +(this.#outTexture !== undefined), layers };
   }
 
   get layers(): number {

@@ -29,7 +29,7 @@ export class Scratch {
   /** Survivors of each cull group, then their exclusive prefix sums and the total. */
   groupOffsets: GPUBuffer;
   /** See shaders/shared/cull_stats.wgsl. */
-  readonly gathered: GPUBuffer;
+  readonly cullStats: GPUBuffer;
   plan: GPUBuffer;
   /** First group of each block and of the next one, [block][2]. */
   pageRanges: GPUBuffer;
@@ -41,7 +41,7 @@ export class Scratch {
   readonly #keys: GPUBuffer;
   /** Slots in the order of their keys. Before the sort it lists the survivors. */
   readonly #order: GPUBuffer;
-  #spare: readonly [GPUBuffer, GPUBuffer];
+  #pingPong: readonly [GPUBuffer, GPUBuffer];
   /** [block][digit] */
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
@@ -49,8 +49,8 @@ export class Scratch {
   readonly #memory: GpuMemory;
   readonly #kept = new Map<string, GPUBuffer>();
 
-  /** @param spareBytes Minimum size of {@link spare}. */
-  constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
+  /** @param pingPongBytes Minimum size of {@link spare}. */
+  constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, pingPongBytes: number) {
     const memory = new GpuMemory(device);
     this.#device = device;
     this.#memory = memory;
@@ -65,14 +65,14 @@ export class Scratch {
       this.detailCounts = buffer('detail.counts', 4 * constants.DETAIL_COUNTS);
       this.visibleBits = buffer('cull.visible_bits', sizes.visibleBits);
       this.groupOffsets = buffer('cull.group_offsets', sizes.groupOffsets);
-      this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);
+      this.cullStats = buffer('cull.stats', 4 * constants.CULL_STATS_WORDS);
       this.plan = buffer('plan.plan', sizes.plan);
       this.pageRanges = buffer('plan.page_ranges', sizes.pageRanges);
       this.limits = memory.buffer('gs.plan.limits', 16, uniform | copyDestination);
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.#keys = perSplat('sort.keys');
       this.#order = perSplat('sort.order');
-      this.#spare = this.#makeSpare(spareBytes);
+      this.#pingPong = this.#makePingPong(pingPongBytes);
       this.digitCounts = buffer(
         'sort.digit_counts',
         4 * constants.DIGITS * Math.ceil(this.capacity / constants.SORT_BLOCK),
@@ -86,7 +86,7 @@ export class Scratch {
 
   /** Depth keys; the sort alternates between the two. The second is one of {@link spare}. */
   get keys(): readonly [GPUBuffer, GPUBuffer] {
-    return [this.#keys, this.#spare[0]];
+    return [this.#keys, this.#pingPong[0]];
   }
 
   /**
@@ -94,12 +94,12 @@ export class Scratch {
    * the other of {@link spare}.
    */
   get order(): readonly [GPUBuffer, GPUBuffer] {
-    return [this.#order, this.#spare[1]];
+    return [this.#order, this.#pingPong[1]];
   }
 
   /** Unused after the sort, and then available to the rasterizer. */
-  get spare(): readonly [GPUBuffer, GPUBuffer] {
-    return this.#spare;
+  get pingPong(): readonly [GPUBuffer, GPUBuffer] {
+    return this.#pingPong;
   }
 
   /** Resizes for other blocks; all bindings of the buffers for groups and blocks must be recreated. */
@@ -126,10 +126,10 @@ export class Scratch {
   }
 
   /** Resizes {@link spare} for a rasterizer; all its bindings must be recreated. */
-  fitSpare(bytes: number): void {
-    if (this.#spare[0].size === this.#spareSize(bytes)) return;
-    for (const buffer of this.#spare) this.#memory.free(buffer);
-    this.#spare = this.#makeSpare(bytes);
+  fitPingPong(bytes: number): void {
+    if (this.#pingPong[0].size === this.#pingPongSize(bytes)) return;
+    for (const buffer of this.#pingPong) this.#memory.free(buffer);
+    this.#pingPong = this.#makePingPong(bytes);
   }
 
   /**
@@ -174,14 +174,14 @@ export class Scratch {
     this.#memory.destroy();
   }
 
-  #spareSize(bytes: number): number {
+  #pingPongSize(bytes: number): number {
     return 4 * Math.max(1, this.capacity, Math.ceil(bytes / 4));
   }
 
-  #makeSpare(bytes: number): readonly [GPUBuffer, GPUBuffer] {
+  #makePingPong(bytes: number): readonly [GPUBuffer, GPUBuffer] {
     const { storage, copyDestination, copySource } = BUFFER_USAGE;
     const buffer = (name: string): GPUBuffer =>
-      this.#memory.buffer(`gs.sort.${name}`, this.#spareSize(bytes), storage | copySource | copyDestination);
+      this.#memory.buffer(`gs.sort.${name}`, this.#pingPongSize(bytes), storage | copySource | copyDestination);
     return [buffer('spare_keys'), buffer('spare_order')];
   }
 }

@@ -1,8 +1,8 @@
 /** The individual stages, for tests and for custom pipelines. */
 export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
 export { CapacityHistory, type Capacity, type SampledFrame } from './capacity-history.js';
-export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
-export { ROUNDS } from './choice/search.js';
+export { passesSelfTest, packSpheres, sphereCloud } from './autotune/self-test.js';
+export { ROUNDS } from './autotune/search.js';
 export { probeDepthStage } from './depth-probe.js';
 export * from './generated/budget-shaders.js';
 export * from './generated/depth-shaders.js';
@@ -29,10 +29,10 @@ export { pageLayout, SLOT_CHUNKS } from './streaming/manifest.js';
 export { packQuantizedChunk, QUANTIZED_CHUNK_WORDS } from './streaming/quantized-geometry.js';
 export { QUANTIZED } from './streaming/quantized-reading.js';
 export { PagePool, poolBytes, poolSize } from './streaming/page-pool.js';
-export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './streaming/page-traffic.js';
+export { MOST_FETCHES, MOST_UNDER_WAY, PageStreamer } from './streaming/page-streamer.js';
 export { folderSource } from './streaming/page-source.js';
 export { Residency } from './streaming/residency.js';
-export { MOST_UPLOAD_BYTES, UPLOAD_SHARE, UploadPace } from './streaming/upload-pace.js';
+export { MOST_UPLOAD_BYTES, UPLOAD_SHARE, UploadBudget } from './streaming/upload-budget.js';
 export { halfBits } from './pack/half.js';
 export { isOfPlanes, mortonOrder } from './pack/morton.js';
 export { recentred } from './pack/recentre.js';

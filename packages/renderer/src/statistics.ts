@@ -32,7 +32,7 @@ export interface FrameStatistics {
  */
 export async function readStatistics(
   device: GPUDevice,
-  scratch: Pick<Scratch, 'plan' | 'gathered' | 'chunkShares'> | undefined,
+  scratch: Pick<Scratch, 'plan' | 'cullStats' | 'chunkShares'> | undefined,
   pairPlan: GPUBuffer | undefined,
 ): Promise<FrameStatistics> {
   if (!scratch) return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0, covered: 0 };
@@ -42,9 +42,9 @@ export async function readStatistics(
     [scratch.plan, overflow.offset],
     [pairPlan, visible.offset],
     [pairPlan, overflow.offset],
-    [scratch.gathered, 4 * constants.UNUSABLE],
+    [scratch.cullStats, 4 * constants.UNUSABLE],
     [scratch.chunkShares, scratch.chunkShares.size - 4],
-    [scratch.gathered, 4 * constants.COVERED],
+    [scratch.cullStats, 4 * constants.COVERED],
   ];
   const staging = device.createBuffer({
     label: 'gs.statistics',

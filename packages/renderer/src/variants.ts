@@ -11,18 +11,19 @@ export interface Variants {
 }
 
 /** Variants that work everywhere. */
-export const SAFE: Variants = {
+export const FALLBACK: Variants = {
   rasterizer: 'quads',
   accumulation: 'rgba16float',
   threads: 'parallel',
 };
 /** Variants that most GPUs prefer. */
-export const LIKELY: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
+export const PREFERRED: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
 
 /** Variants of a device, set by `autotune`. */
-const known = (device: GPUDevice): { variants: Variants } => perDevice(device, 'variants', () => ({ variants: SAFE }));
+const known = (device: GPUDevice): { variants: Variants } =>
+  perDevice(device, 'variants', () => ({ variants: FALLBACK }));
 
-export function remember(device: GPUDevice, variants: Variants): void {
+export function setVariants(device: GPUDevice, variants: Variants): void {
   known(device).variants = variants;
 }
 
@@ -33,14 +34,14 @@ export const variantsOf = (device: GPUDevice): Variants => known(device).variant
 export const faultsOf = (device: object): string[] => perDevice(device, 'faults', () => []);
 
 /** Replaces every `auto` of the settings by the device's variant. */
-export function settle(variants: Variants, levers: RenderSettings): RenderSettings & Variants {
-  const own = levers.order === 'pixel' ? 'tiles' : variants.rasterizer;
-  const rasterizer = levers.rasterizer === 'auto' ? own : levers.rasterizer;
-  const suits = rasterizer === variants.rasterizer ? variants.accumulation : SAFE.accumulation;
+export function resolveSettings(variants: Variants, settings: RenderSettings): RenderSettings & Variants {
+  const own = settings.order === 'pixel' ? 'tiles' : variants.rasterizer;
+  const rasterizer = settings.rasterizer === 'auto' ? own : settings.rasterizer;
+  const suits = rasterizer === variants.rasterizer ? variants.accumulation : FALLBACK.accumulation;
   return {
-    ...levers,
+    ...settings,
     rasterizer,
-    accumulation: levers.accumulation === 'auto' ? suits : levers.accumulation,
-    threads: levers.threads === 'auto' ? variants.threads : levers.threads,
+    accumulation: settings.accumulation === 'auto' ? suits : settings.accumulation,
+    threads: settings.threads === 'auto' ? variants.threads : settings.threads,
   };
 }

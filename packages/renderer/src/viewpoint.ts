@@ -9,7 +9,7 @@ import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import { orderOn } from './lazy-order.js';
+import { orderOn } from './pixel-order-loader.js';
 import type { RenderSettings } from './render-settings.js';
 import type { FrameSettings, FrameTarget, Target } from './frame-target.js';
 import { OverdrawLimit } from './overdraw.js';
@@ -21,7 +21,7 @@ import type { FrameCounts } from './capacity.js';
 import { checkArguments, checkFrame, settingsOf } from './checks.js';
 import { copyCounts } from './copy-counts.js';
 import type { FrameStatistics } from './statistics.js';
-import { settle, variantsOf, type Variants } from './variants.js';
+import { resolveSettings, variantsOf, type Variants } from './variants.js';
 import { scaled } from './view.js';
 import type { World } from './world.js';
 
@@ -136,9 +136,9 @@ export class Viewpoint {
     if (settings === this.#settings) return;
     this.#variants = variantsOf(this.#device);
     this.#known = new WeakMap();
-    const levers = this.#resolve(settings);
+    const resolved = this.#resolve(settings);
     this.#settings = settings;
-    this.#useEngine(levers);
+    this.#useEngine(resolved);
   }
 
   /** The {@link settings} with every `auto` resolved for this device. */
@@ -175,9 +175,9 @@ export class Viewpoint {
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
     const { rasterizer } = this.#engine;
     const all = settings.map((each) => this.#resolve(each));
-    for (const levers of all) {
-      const order = levers.order === 'pixel' ? orderOn(this.#device).now : undefined;
-      rasterizer.prepare(levers, targetFormat, order?.painter(levers));
+    for (const resolved of all) {
+      const order = resolved.order === 'pixel' ? orderOn(this.#device).now : undefined;
+      rasterizer.prepare(resolved, targetFormat, order?.painter(resolved));
     }
     const isSmaller = all.some(({ resolutionScale }) => resolutionScale < 1);
     if (isSmaller) this.#compose.prepare(targetFormat, rasterizer.finishes(targetFormat));
@@ -247,27 +247,27 @@ export class Viewpoint {
     this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first hidden splat.
     const isExact = (depth && !order) || asked.order === 'distance';
-    const levers = isExact
+    const resolved = isExact
       ? { ...asked, depthKeyBits: 32 as const, ...(depth && { order: 'center' as const }) }
       : asked;
-    const { resources: all, rasterizer, stages } = this.#useEngine(levers);
-    const drawn = scaled(camera, levers.resolutionScale * this.pixelShare);
+    const { resources: all, rasterizer, stages } = this.#useEngine(resolved);
+    const drawn = scaled(camera, resolved.resolutionScale * this.pixelShare);
     depth?.prepare(camera, drawn, rasterizer.name, auxiliary);
-    const resources = all.fit(this.world, levers.splatBudget);
+    const resources = all.fit(this.world, resolved.splatBudget);
     const { table, scratch, bindings, monitor } = resources;
     table.update();
     timer?.startFrame();
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, levers, picture.filter, this.#overdraw?.mostFor(table.splats));
+    table.look(drawn, pixelArea, resolved, picture.filter, this.#overdraw?.mostFor(table.splats));
     const requests = recordProjection(encoder, {
       stages,
       bindings,
       scratch,
       camera: drawn,
-      levers,
+      settings: resolved,
       keepsSurvivors: auxiliary !== undefined,
       hasDetail: table.hasDetail,
-      isBudgeted: levers.splatBudget > 0 && table.detailBudget !== undefined,
+      isBudgeted: resolved.splatBudget > 0 && table.detailBudget !== undefined,
       order,
       keepsDepths: depth !== undefined && !order,
       timer,
@@ -277,11 +277,11 @@ export class Viewpoint {
       {
         pixels: drawn.width * drawn.height,
         wholePixels: camera.width * camera.height,
-        isWhole: isWhole(levers, this.resolvedSettings),
+        isWhole: isWhole(resolved, this.resolvedSettings),
       },
     );
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
-    const how = { levers, timer, ...this.#wayToPaint(picture, levers, drawn, scratch, order) };
+    const how = { settings: resolved, timer, ...this.#wayToPaint(picture, resolved, drawn, scratch, order) };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);
     this.#last = { stages, bindings, scale: drawn.width / camera.width };
     return { last, isWatched, submissions, requests, resources };
@@ -386,7 +386,7 @@ export class Viewpoint {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'levers' | 'timer' | 'depth' | 'depths' | 'painter'>,
+    how: Pick<Painting, 'settings' | 'timer' | 'depth' | 'depths' | 'painter'>,
     { over, colours }: FrameTarget,
     submissions: Submissions,
   ): GPUCommandEncoder {
@@ -428,12 +428,12 @@ export class Viewpoint {
   /** Variant of tile or quad rasterization for frames with depth or auxiliary outputs. */
   #wayToPaint(
     { depth, auxiliary }: FrameTarget,
-    levers: RenderSettings,
+    resolved: RenderSettings,
     camera: Camera,
     scratch: Scratch,
     order: PixelOrder | undefined,
   ): Pick<Painting, 'depth' | 'depths' | 'painter'> {
-    if (order) return { painter: order.painter(levers, camera, scratch, depth) };
+    if (order) return { painter: order.painter(resolved, camera, scratch, depth) };
     if (depth) return { depth, depths: scratch.depths, painter: depth.painter(scratch.depths) };
     if (!auxiliary) return {};
     const painter = auxiliary.painter(this.#device, scratch.survivors);
@@ -461,23 +461,23 @@ export class Viewpoint {
   #resolve(settings: FrameSettings): RenderSettings & Variants {
     const known = this.#known.get(settings);
     if (known) return known;
-    const made = settle(this.#variants, settingsOf(settings));
+    const made = resolveSettings(this.#variants, settingsOf(settings));
     this.#known.set(settings, made);
     return made;
   }
 
   /** The engine for frames with these settings: created again if they need another rasterizer. */
-  #useEngine(levers: RenderSettings & Variants): Engine {
-    if (this.#engine.serves(levers)) return this.#engine;
-    const engine = this.#makeEngine(levers);
+  #useEngine(resolved: RenderSettings & Variants): Engine {
+    if (this.#engine.serves(resolved)) return this.#engine;
+    const engine = this.#makeEngine(resolved);
     this.#engine.destroy();
     this.#last = undefined;
     return (this.#engine = engine);
   }
 
-  #makeEngine(levers: RenderSettings & Variants): Engine {
+  #makeEngine(resolved: RenderSettings & Variants): Engine {
     const pairsAtOnce = (): number => this.#pacer.pairsAtOnce;
-    return new Engine(this.#device, levers, { pairsAtOnce, onIncomplete: this.#onIncomplete });
+    return new Engine(this.#device, resolved, { pairsAtOnce, onIncomplete: this.#onIncomplete });
   }
 
   #targetOf({ target }: FrameTarget, camera: Camera): Target {
@@ -506,7 +506,7 @@ export class Viewpoint {
  * Whether a frame is drawn with the full settings of rest: one with fewer pixels, or with an earlier stop, says less
  * about the required capacity.
  */
-const isWhole = (levers: RenderSettings, base: RenderSettings): boolean =>
-  levers.resolutionScale >= base.resolutionScale && levers.transmittanceMin <= base.transmittanceMin;
+const isWhole = (resolved: RenderSettings, base: RenderSettings): boolean =>
+  resolved.resolutionScale >= base.resolutionScale && resolved.transmittanceMin <= base.transmittanceMin;
 
 const isTexture = (target: FrameTarget['target']): target is GPUTexture => 'createView' in target;

@@ -98,7 +98,7 @@ describe('S12: all scenes of a page together', () => {
         await element.ready;
         assert(element.loaded, String(element.error?.message));
       }
-      assertEqual(ledger().spare.size, 0, 'scenes that may be given back');
+      assertEqual(ledger().releasable.size, 0, 'scenes that may be given back');
     });
   });
 

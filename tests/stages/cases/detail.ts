@@ -49,11 +49,11 @@ async function cutOnGpu(
     visible_bits: bench.buffer(4 * constants.WORDS_PER_GROUP * groups),
   });
   const counting = budgetStage.count.bind({ view: uniform, chunks, details, detail_counts: counts });
-  const allowing = budgetStage.allow.bind({ view: uniform, detail_counts: counts, chunk_shares: shares });
+  const allowing = budgetStage.threshold.bind({ view: uniform, detail_counts: counts, chunk_shares: shares });
   bench.compute((pass) => {
     if (budget > 0) {
       budgetStage.count.record(pass, counting, packed.count);
-      budgetStage.allow.record(pass, allowing);
+      budgetStage.threshold.record(pass, allowing);
     }
     stage.record(pass, bindings, packed.count);
   });

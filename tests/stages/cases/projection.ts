@@ -66,7 +66,7 @@ export async function cullOnGpu(
   // What `cull` does not write must come from `cull_chunks`: garbage would show.
   const bits = bench.buffer(new Uint32Array(WORDS_PER_GROUP * groups).fill(0xffffffff));
   const counts = bench.buffer(new Uint32Array(groups).fill(0xffffffff));
-  const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
+  const cull_stats = bench.buffer(4 * constants.CULL_STATS_WORDS);
   const shared = { view, visible_bits: bits, group_counts: counts };
   const shares = bench.buffer(4 * (groups + 1));
   const [chunkStage, stage] = [cullChunksStage(bench.device), cullStage(bench.device, threads)];
@@ -77,14 +77,18 @@ export async function cullOnGpu(
     chunk_shares: shares,
   });
   const bindings = stage.bind({
-    ...{ ...shared, gaussians, gathered },
+    ...{ ...shared, gaussians, cull_stats },
     chunk_shares: shares,
   });
   bench.compute((pass) => {
     chunkStage.record(pass, chunkBindings, packed.count);
     stage.record(pass, bindings, packed.count);
   });
-  const [words, groupCounts, counters] = [await bench.read(bits), await bench.read(counts), await bench.read(gathered)];
+  const [words, groupCounts, counters] = [
+    await bench.read(bits),
+    await bench.read(counts),
+    await bench.read(cull_stats),
+  ];
   const visible = Array.from({ length: packed.count }, (_, i) => ((words[Math.floor(i / 32)] >>> (i % 32)) & 1) === 1);
   const expected = new Uint32Array(groups);
   visible.forEach((flag, i) => (expected[Math.floor(i / CULL_GROUP)] += flag ? 1 : 0));
@@ -158,7 +162,7 @@ export async function projectOnGpu(
   const splats = bench.buffer(layouts.ProjectedSplat.size * count);
   const keys = bench.buffer(4 * count);
   const survivors = bench.buffer(Uint32Array.from({ length: count }, (_, i) => i));
-  const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
+  const cull_stats = bench.buffer(4 * constants.CULL_STATS_WORDS);
   const stage = projectStage(device);
   const chunk_shares = bench.buffer(new Uint32Array(new Float32Array(cullGroups(count) + 1).fill(1).buffer));
   const bindings = stage.bind({
@@ -167,7 +171,7 @@ export async function projectOnGpu(
     sh,
     survivors,
     plan: planBuffer,
-    gathered,
+    cull_stats,
     splats,
     keys,
     chunk_shares,

@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { Attributes, DetailChoice } from '../attributes.js';
 import type { LoadedGaussians, OwnedGaussians } from '../gpu/loaded-gaussians.js';
-import type { DetailLevers } from '../gpu/painter.js';
+import type { LodSettings } from '../gpu/painter.js';
 import { buildLevels } from '../detail/build-levels.js';
 import { LatestTask } from '../latest-task.js';
 import type { Services } from '../stage-host.js';
@@ -11,7 +11,7 @@ const LEAST_SPLATS = 50_000;
 /** Splats up to which they are built unasked: all of them are read back and merged in the page's memory, some 150 bytes of each. */
 const MOST_SPLATS = 8_000_000;
 /** How long pictures must have moved with less than the whole before levels are built, ms: the first frames of a scene, and those after a rest, are often slow. */
-const PATIENCE_MS = 1_500;
+const MAX_SLOW_MS = 1_500;
 /** Time between two frames of one motion, ms: what is longer is a rest, and does not count. */
 const LONGEST_GAP_MS = 1_000;
 
@@ -30,7 +30,7 @@ export class DetailController {
   readonly #host: DetailHost;
   #scene: LoadedGaussians | null = null;
   /** What a streamed scene came with. */
-  #own: DetailLevers = {};
+  #own: LodSettings = {};
   /** Splats whose levels are there, on their way, or not to be had. */
   #of: OwnedGaussians | undefined;
   readonly #building = new LatestTask();
@@ -49,7 +49,7 @@ export class DetailController {
   update(scene: LoadedGaussians | null): void {
     if (scene !== this.#scene) this.#begin(scene);
     if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
-    this.#allow(scene, this.#host.attributes.detail);
+    this.#setThreshold(scene, this.#host.attributes.detail);
     if (scene.hasOwnLevels) return;
     if (this.#choice === 'off') return this.#dismiss(scene);
     if (this.#of === scene.gaussians || !this.#isWorthIt(scene)) return;
@@ -57,12 +57,12 @@ export class DetailController {
   }
 
   /** Tells of each picture in motion whether it was drawn whole. */
-  notePace(isWhole: boolean): void {
+  reportMotionFrame(isWhole: boolean): void {
     const gap = performance.now() - this.#noted;
     this.#noted += gap;
     if (isWhole) this.#slowMs = 0;
     else if (gap < LONGEST_GAP_MS) this.#slowMs += gap;
-    if (this.#isPressed || this.#slowMs < PATIENCE_MS) return;
+    if (this.#isPressed || this.#slowMs < MAX_SLOW_MS) return;
     this.#isPressed = true;
     if (this.#scene) this.update(this.#scene);
   }
@@ -82,7 +82,7 @@ export class DetailController {
   }
 
   /** Lets pictures be off by so much from now on. */
-  #allow(scene: LoadedGaussians, choice: DetailChoice): void {
+  #setThreshold(scene: LoadedGaussians, choice: DetailChoice): void {
     if (choice === this.#choice) return;
     this.#choice = choice;
     const pixels = choice === 'auto' ? this.#own.detail : choice === 'off' ? 0 : choice;

@@ -170,7 +170,7 @@ export class SceneController implements ReactiveController {
     this.#isUnseen = !isSeen;
     if (isSeen && this.#isAway) void this.#attempt(this.#request!, this.#running.renew(), false, () => undefined);
     if (isSeen) this.#isAway = false;
-    this.#spare(false);
+    this.#setReleasable(false);
   }
 
   /**
@@ -190,11 +190,11 @@ export class SceneController implements ReactiveController {
   hostConnected(): void {
     clearTimeout(this.#releaseTimer);
     this.#releaseTimer = undefined;
-    this.#spare(false);
+    this.#setReleasable(false);
   }
 
   hostDisconnected(): void {
-    this.#spare(true);
+    this.#setReleasable(true);
     this.#releaseTimer = setTimeout(() => this.want(null, false), timerMs(this.#of.services.releaseDelay));
   }
 
@@ -311,7 +311,7 @@ export class SceneController implements ReactiveController {
       // A small preview stays on show meanwhile.
       if (!isSmall) this.#drop(false);
     };
-    this.#spare(true);
+    this.#setReleasable(true);
     const scene = await openScene(request, {
       open: this.#of.open,
       device: services.sharedDevice,
@@ -319,7 +319,7 @@ export class SceneController implements ReactiveController {
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
       live: () => this.#of.liveRequest,
       ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
-    }).finally(() => this.#spare(false));
+    }).finally(() => this.#setReleasable(false));
     if (signal.aborted) return scene.destroy();
     const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';
     this.#replace(scene, false);
@@ -354,7 +354,7 @@ export class SceneController implements ReactiveController {
     this.#isAway = false;
     this.#shownRequest = this.#request;
     this.#isPreview = isPreview;
-    this.#spare(isPreview);
+    this.#setReleasable(isPreview);
   }
 
   #clear(): void {
@@ -368,14 +368,14 @@ export class SceneController implements ReactiveController {
   }
 
   /** Whether the scene on show may be dropped where others lack its memory: the element is gone, or another scene is to take its place. */
-  #spare(isSpare: boolean): void {
+  #setReleasable(isSpare: boolean): void {
     if (this.#scene === null) return;
-    const { spare } = this.#scene.place.memory;
+    const { releasable } = this.#scene.place.memory;
     // What a generator has come to is not to be had again.
     const isUnseen = this.#isUnseen && this.#state === 'ready' && !this.#scene.live;
     if (isSpare || this.#releaseTimer || isUnseen)
-      spare.set(this.#giveBack, isUnseen ? this.#scene.gaussians.byteLength : 0);
-    else spare.delete(this.#giveBack);
+      releasable.set(this.#giveBack, isUnseen ? this.#scene.gaussians.byteLength : 0);
+    else releasable.delete(this.#giveBack);
   }
 
   readonly #giveBack = (): void => {
@@ -387,7 +387,7 @@ export class SceneController implements ReactiveController {
   #drop(clear: boolean): void {
     if (this.#scene !== null || clear) this.#of.hide(clear);
     if (this.#scene === null) return;
-    this.#scene.place.memory.spare.delete(this.#giveBack);
+    this.#scene.place.memory.releasable.delete(this.#giveBack);
     this.#scene.destroy();
     this.#scene = null;
   }

@@ -6,7 +6,7 @@ import { targetMsOf, type FrameClient, type FrameScheduler } from '../gpu/frame-
 import type { CanvasFrame, Contents, Drawable, Painter, Place, Surface } from '../gpu/painter.js';
 import { why } from '../gpu/request-device.js';
 import type { CameraController } from './camera-controller.js';
-import type * as dynamicQuality from './pace-controller.js';
+import type * as dynamicQuality from './dynamic-quality-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
@@ -33,7 +33,7 @@ export interface ViewHost extends Contents {
   afterFrame(camera: Camera): void;
   cameraChanged(source: CameraChangeSource): void;
   /** Called for each frame of a motion that was timed: whether such are drawn whole. */
-  notePace(isWhole: boolean): void;
+  reportMotionFrame(isWhole: boolean): void;
   /** Drawing has failed for good. */
   drawingFailed(error: unknown): void;
 }
@@ -44,7 +44,10 @@ interface Settle {
 }
 
 /** Sets the quality while moving; fetched once for all elements. Without it all frames are whole, and none waits for it. */
-const quality = new Lazy('the code that sets the quality while moving', () => import('./pace-controller.js'));
+const quality = new Lazy(
+  'the code that sets the quality while moving',
+  () => import('./dynamic-quality-controller.js'),
+);
 
 /** A scene that is replaced sooner, as a preview may be, needs nothing made for it, ms. */
 const PREPARE_AFTER_MS = 300;
@@ -52,7 +55,7 @@ const PREPARE_AFTER_MS = 300;
 /** Draws the scene into the element's canvas, a frame at a time and only when asked. */
 export class ViewController implements FrameClient {
   readonly #host: ViewHost;
-  #ownPace: dynamicQuality.PaceController | undefined;
+  #ownPace: dynamicQuality.DynamicQualityController | undefined;
   #painter: Painter | null = null;
   /** What is drawn into, and the device that it was set up for. */
   #surface: Surface | null = null;
@@ -67,17 +70,17 @@ export class ViewController implements FrameClient {
   }
 
   /** What frames in motion are drawn with; undefined until its code is there. */
-  get #pace(): dynamicQuality.PaceController | undefined {
+  get #pace(): dynamicQuality.DynamicQualityController | undefined {
     const host = this.#host;
     return (this.#ownPace ??=
       quality.value &&
-      new quality.value.PaceController({
+      new quality.value.DynamicQualityController({
         isOn: () => this.#isAuto,
         scheduler: () => host.scheduler,
         frameBudget: () => host.attributes.frameBudget,
         requestFrame: () => this.requestFrame(),
         mayFade: () => !this.#painter?.filter,
-        onPace: (isWhole) => host.notePace(isWhole),
+        onFrameTimed: (isWhole) => host.reportMotionFrame(isWhole),
       }));
   }
 
@@ -226,7 +229,8 @@ export class ViewController implements FrameClient {
     }
     const pixels = request.camera.width * request.camera.height;
     const occasion = { now, pixels, hasChanged, goesOn: this.#host.camera.isMoving };
-    const draw: dynamicQuality.DrawFrame = (levers, onTime) => painter.render({ ...request, levers }, content, onTime);
+    const draw: dynamicQuality.DrawFrame = (settings, onTime) =>
+      painter.render({ ...request, settings }, content, onTime);
     if (this.#pace) this.#pace.draw(occasion, this.#host.canvas!, draw);
     else draw(undefined);
     this.#prepareSoon(painter);
@@ -245,7 +249,7 @@ export class ViewController implements FrameClient {
     this.#preparing ??= setTimeout(() => {
       void quality.settled.then(() => {
         this.#preparing = undefined;
-        if (this.#painter === painter && quality.value) painter.prepare(quality.value.MOVING_LEVERS);
+        if (this.#painter === painter && quality.value) painter.prepare(quality.value.MOVING_SETTINGS);
       });
     }, PREPARE_AFTER_MS);
   }

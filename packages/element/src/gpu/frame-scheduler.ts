@@ -1,4 +1,4 @@
-import { DisplayInterval } from '../pace/display-interval.js';
+import { DisplayInterval } from '../dynamic-quality/display-interval.js';
 
 /** Something that draws. */
 export interface FrameClient {

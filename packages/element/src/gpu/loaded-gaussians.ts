@@ -2,7 +2,7 @@ import type { GaussianScene } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Timeline } from '../live/live-model.js';
-import type { Contents, DetailLevers, Painter, PainterEvents, Drawable, Place } from './painter.js';
+import type { Contents, LodSettings, Painter, PainterEvents, Drawable, Place } from './painter.js';
 import type { DeviceLease } from './shared-device.js';
 import { Viewport } from './viewport.js';
 
@@ -56,7 +56,7 @@ export class LoadedGaussians implements Drawable {
   readonly #lease: DeviceLease;
   #gaussians: OwnedGaussians;
   #levels: OwnedLevels | undefined;
-  #detail: DetailLevers;
+  #detail: LodSettings;
   readonly #life = new AbortController();
 
   constructor(
@@ -72,7 +72,7 @@ export class LoadedGaussians implements Drawable {
       warnings = [],
     }: {
       live?: Timeline | undefined;
-      detail?: DetailLevers;
+      detail?: LodSettings;
       order?: 'pixel' | undefined;
       hasMeshes?: boolean | undefined;
       warnings?: readonly string[] | undefined;
@@ -117,11 +117,11 @@ export class LoadedGaussians implements Drawable {
   }
 
   /** How much detail is drawn, at rest too. */
-  get detail(): DetailLevers {
+  get detail(): LodSettings {
     return this.#detail;
   }
 
-  setDetail(detail: DetailLevers): void {
+  setDetail(detail: LodSettings): void {
     this.#detail = detail;
   }
 

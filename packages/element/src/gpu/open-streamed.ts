@@ -9,7 +9,7 @@ import type { ClipPlayer } from '../live/clip-player.js';
 import type { LiveRequest } from '../live/live-model.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { OwnedGaussians } from './loaded-gaussians.js';
-import type { DetailLevers } from './painter.js';
+import type { LodSettings } from './painter.js';
 import { streamCaps } from './stream-caps.js';
 
 export interface StreamedOptions {
@@ -29,7 +29,7 @@ export interface OpenedStream {
   readonly gaussians: OwnedGaussians;
   readonly bounds: SceneBounds;
   readonly order?: 'pixel' | undefined;
-  readonly detail?: DetailLevers;
+  readonly detail?: LodSettings;
   readonly live?: ClipPlayer;
   readonly warnings?: readonly string[];
 }

@@ -23,7 +23,7 @@ export interface Rendering {
 }
 
 /** How much detail is drawn of a scene that has levels of it. */
-export type DetailLevers = Pick<FrameSettings, 'detail' | 'splatBudget'>;
+export type LodSettings = Pick<FrameSettings, 'detail' | 'splatBudget'>;
 
 /** Counts that have to be read back from the GPU. */
 export interface ReadCounts {
@@ -60,7 +60,7 @@ export interface Drawable {
 export interface Contents {
   readonly world: World;
   /** How much detail is drawn, at rest too. */
-  readonly levels: DetailLevers;
+  readonly levels: LodSettings;
   /**
    * Called before each frame: puts into the world what is to be drawn.
    * @returns what changes whenever the frame would
@@ -92,7 +92,7 @@ export interface CanvasFrame {
   /** Premultiplied. */
   readonly background?: Rgba | undefined;
   /** What is other than at rest. */
-  readonly levers?: Partial<PerFrameSettings> | undefined;
+  readonly settings?: Partial<PerFrameSettings> | undefined;
   /** The picture is read in the same task. */
   readonly isRead?: boolean;
 }
@@ -117,7 +117,7 @@ export interface Painter {
   /** Draws the frames to come like this. */
   setRendering(rendering: Rendering): void;
   /** Makes what frames with other settings need, so that none of them has to. */
-  prepare(levers: readonly Partial<PerFrameSettings>[]): void;
+  prepare(settings: readonly Partial<PerFrameSettings>[]): void;
   /** The canvas's context, set up to be drawn into; null for a canvas of another kind. */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null;
   /**

@@ -89,23 +89,23 @@ export class Viewport implements Painter {
   }
 
   /** Settings of a frame; with settings of motion where there are some. */
-  #settings(levers?: Partial<PerFrameSettings>): FrameSettings {
+  #settings(settings?: Partial<PerFrameSettings>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { quality, shDegree, order } = this.#rendering;
     // Whichever leaves out more: what the page asks for, or the pace.
-    const most = Math.max(detail, levers?.detail ?? 0);
-    return { quality, shDegree, order, submissions: this.#submissions, ...levers, detail: most, splatBudget };
+    const most = Math.max(detail, settings?.detail ?? 0);
+    return { quality, shDegree, order, submissions: this.#submissions, ...settings, detail: most, splatBudget };
   }
 
   get isPrepared(): boolean {
     return this.#isPrepared;
   }
 
-  prepare(levers: readonly Partial<PerFrameSettings>[]): void {
+  prepare(settings: readonly Partial<PerFrameSettings>[]): void {
     if (this.isLost || this.#isDestroyed) return;
     this.#isPrepared = true;
     this.viewpoint.prepare(
-      levers.map((each) => this.#settings(each)),
+      settings.map((each) => this.#settings(each)),
       canvasFormat(),
     );
   }
@@ -138,7 +138,7 @@ export class Viewport implements Painter {
 
   #draw(frame: Frame, content: string): void {
     this.#layout = this.#contents.world.layout;
-    const settings = this.#settings(frame.levers);
+    const settings = this.#settings(frame.settings);
     const { filter } = this.#rendering;
     const draw = (drawn: Frame): void => {
       const { camera, target, background: over } = drawn;

@@ -9,7 +9,7 @@ export interface Frame {
   /** Premultiplied. */
   readonly background?: Rgba | undefined;
   /** What is other than at rest. */
-  readonly levers?: Partial<PerFrameSettings> | undefined;
+  readonly settings?: Partial<PerFrameSettings> | undefined;
 }
 
 /** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */

@@ -5,7 +5,7 @@ import { buffersOf } from './protocol.js';
 /** Requests that a helper has at the same time: the next is there when one is done. */
 const AT_ONCE = 3;
 /** A helper that has answered nothing for so long is not waited for any more, ms. */
-const PATIENCE_MS = 5_000;
+const TIMEOUT_MS = 5_000;
 
 interface Helper {
   readonly port: MessagePort;
@@ -83,7 +83,7 @@ export class PlyHelpers {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const isSilent = await new Promise<boolean>((resolve) => {
       this.#wake = () => resolve(false);
-      timer = setTimeout(() => resolve(true), PATIENCE_MS);
+      timer = setTimeout(() => resolve(true), TIMEOUT_MS);
     });
     clearTimeout(timer);
     this.#wake = () => undefined;

@@ -125,7 +125,7 @@ export class GlPainter implements Painter {
     // A scene that was loaded without a size had no first frame, and has no order yet.
     if (this.#sorted === undefined) return void (this.#isOwed = true);
     if (onTime === undefined) return this.#draw(frame);
-    const { resolutionScale = 1 } = frame.levers ?? {};
+    const { resolutionScale = 1 } = frame.settings ?? {};
     const least = SURE_SHARE * this.#wholeMs * resolutionScale ** 2;
     this.scene.lease.clock
       .time(() => this.#draw(frame), least)
@@ -195,12 +195,12 @@ export class GlPainter implements Painter {
     this.#show(frame);
   }
 
-  #paint({ camera, levers }: CanvasFrame): void {
+  #paint({ camera, settings }: CanvasFrame): void {
     const { quality, shDegree, filter } = this.#rendering;
     this.scene.frames.render({
       ...{ camera, shDegree, filter },
       accumulation: quality === 'balanced' || quality === 'fast' ? 'rgba16float' : 'rgba32float',
-      resolutionScale: this.pixelShare * (levers?.resolutionScale ?? 1),
+      resolutionScale: this.pixelShare * (settings?.resolutionScale ?? 1),
     });
   }
 

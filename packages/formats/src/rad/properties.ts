@@ -82,7 +82,7 @@ function reader({ encoding, min, max }: RadProperty, bytes: Uint8Array, all: num
   const view = viewOf(bytes);
   const single = new DataView(new ArrayBuffer(4));
   /** Of values whose lowest bytes stand first, all of them, then the next. */
-  const gathered = (width: number, at: number): DataView => {
+  const interleaved = (width: number, at: number): DataView => {
     for (let k = 0; k < width; k++) single.setUint8(k, bytes[k * all + at]);
     return single;
   };
@@ -91,8 +91,8 @@ function reader({ encoding, min, max }: RadProperty, bytes: Uint8Array, all: num
     f32: (at) => view.getFloat32(4 * at, true),
     f16: (at) => halfToNumber(view.getUint16(2 * at, true)),
     ln_f16: (at) => Math.exp(halfToNumber(view.getUint16(2 * at, true))),
-    f32_lebytes: (at) => gathered(4, at).getFloat32(0, true),
-    f16_lebytes: (at) => halfToNumber(gathered(2, at).getUint16(0, true)),
+    f32_lebytes: (at) => interleaved(4, at).getFloat32(0, true),
+    f16_lebytes: (at) => halfToNumber(interleaved(2, at).getUint16(0, true)),
     u16: (at) => view.getUint16(2 * at, true),
     u32: (at) => view.getUint32(4 * at, true),
     r8: (at) => min + (bytes[at] / 255) * (max - min),

@@ -17,7 +17,7 @@ const BEAT_MS = 4;
 const LATE_MS = 2;
 
 /** Notification on the main thread, ms. */
-export interface Told {
+export interface ObservedTime {
   readonly now: number;
   /** Earliest possible time of the event: earlier than `now` if the thread was busy until then. */
   readonly since: number;
@@ -32,7 +32,7 @@ class ThreadWatch {
   #due = 0;
   #block = { from: -Infinity, to: -Infinity };
 
-  async during(waiting: Promise<unknown>): Promise<Told> {
+  async during(waiting: Promise<unknown>): Promise<ObservedTime> {
     this.#waiting++;
     if (this.#timer === undefined) this.#next(0);
     try {

@@ -1,5 +1,5 @@
 import { perDevice } from './kernel.js';
-import { threadWatch, type Told } from './page-thread.js';
+import { threadWatch, type ObservedTime } from './page-thread.js';
 
 /** Number of empty submissions in a calibration; the fastest is the latency of an idle GPU. */
 const TRIES = 4;
@@ -32,7 +32,7 @@ export class QueueClock {
   #latency = Infinity;
   #measuredAt = -Infinity;
   /** Last known completion time of submitted work. */
-  #last: Told = { now: -Infinity, since: -Infinity };
+  #last: ObservedTime = { now: -Infinity, since: -Infinity };
   /** Work reported at about the same moment: start, number of items, and their total time, ms. */
   #together = { now: -Infinity, count: 0, milliseconds: 0 };
 
@@ -67,11 +67,11 @@ export class QueueClock {
   }
 
   /** Waits for all submitted work. @returns The time of the notification, and the previous completion time. */
-  async done(): Promise<Told & { readonly before: Told }> {
-    const told = await threadWatch.during(this.#device.queue.onSubmittedWorkDone());
+  async done(): Promise<ObservedTime & { readonly before: ObservedTime }> {
+    const observed = await threadWatch.during(this.#device.queue.onSubmittedWorkDone());
     const before = this.#last;
-    this.#last = told;
-    return { ...told, before };
+    this.#last = observed;
+    return { ...observed, before };
   }
 
   /** Times the work that `submit` submits. Rejects if the device is lost. */

@@ -27,23 +27,23 @@ export interface PairBuffers {
 const wholeGroups = (pairs: number): number => PROJECT_GROUP * Math.ceil(pairs / PROJECT_GROUP);
 
 /** Bytes of either ping-pong buffer. */
-export const spareBytesOf = ({ capacity, pairCapacity }: Room): number =>
+export const releasableBytesOf = ({ capacity, pairCapacity }: Room): number =>
   WORD_BYTES * Math.max(wholeGroups(pairCapacity), capacity);
 
 export function pairBuffers(
   memory: GpuMemory,
-  { capacity, pairCapacity, spare }: Pick<RasterizerInputs, 'capacity' | 'pairCapacity' | 'spare'>,
+  { capacity, pairCapacity, pingPong }: Pick<RasterizerInputs, 'capacity' | 'pairCapacity' | 'pingPong'>,
 ): PairBuffers {
   const { storage, copyDestination, copySource } = BUFFER_USAGE;
   const buffer = (name: string, bytes: number): GPUBuffer =>
     memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination);
   const pairs = wholeGroups(pairCapacity);
   return {
-    rects: spare[0],
+    rects: pingPong[0],
     groupPairs: buffer('group_pairs', scanBytes(Math.ceil(capacity / PREFIX_THREADS))),
     plan: buffer('plan', layouts.Plan.size + layouts.PagePlan.size),
-    bins: [buffer('bins', WORD_BYTES * pairs), spare[0]],
-    pairs: [spare[1], buffer('pairs', WORD_BYTES * pairs)],
+    bins: [buffer('bins', WORD_BYTES * pairs), pingPong[0]],
+    pairs: [pingPong[1], buffer('pairs', WORD_BYTES * pairs)],
     digitCounts: buffer('digit_counts', 4 * DIGITS * Math.ceil(pairCapacity / SORT_BLOCK)),
     digitTotals: buffer('digit_totals', 4 * DIGITS),
   };

@@ -59,20 +59,20 @@ export class PixelOrder {
       kernel: (variant) => rasterizeKernel(this.#device, rasterizeTilesOrder, variant, overrides),
       bind: (kernel, painted) =>
         this.#bound.bind(kernel, painted, {
-          ...{ pixel_depths: depthsIn(scratch!), gathered: scratch!.gathered },
+          ...{ pixel_depths: depthsIn(scratch!), cull_stats: scratch!.cullStats },
           ...(depth?.resources ?? noDepth(this.#device)),
         }),
     };
   }
 
   #bindPages({ table, scratch }: FrameBindings): Recorded[] {
-    const { order, plan, gathered, keys } = scratch;
+    const { order, plan, cullStats, keys } = scratch;
     return table.pages.map((page, i) => {
       const plain = page.reading ? pixelDepthsQuantized : pixelDepths;
       const kernel = kernelOf<DepthsShader>(this.#device, table.readingOf(i)?.pixelDepths ?? plain);
       const group = kernel.bind({
         ...table.modifiersOf(i),
-        ...{ view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, gathered },
+        ...{ view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, cull_stats: cullStats },
         ...{ pixel_depths: depthsIn(scratch), keys: keys[0] },
       });
       return { kernel, group, groups: Math.ceil(Math.min(scratch.capacity, page.count) / constants.PROJECT_GROUP) };

@@ -56,7 +56,7 @@ export class QuadsRasterizer implements Rasterizer {
     return false;
   }
 
-  spareBytes(): number {
+  pingPongBytes(): number {
     return 0;
   }
 

@@ -19,10 +19,10 @@ export interface RasterizerInputs {
   /** Slots from near to far. */
   readonly order: GPUBuffer;
   /**
-   * At least {@link Rasterizer.spareBytes} each: reserved for the rasterizer from the end of the sort until the next
+   * At least {@link Rasterizer.pingPongBytes} each: reserved for the rasterizer from the end of the sort until the next
    * frame.
    */
-  readonly spare: readonly [GPUBuffer, GPUBuffer];
+  readonly pingPong: readonly [GPUBuffer, GPUBuffer];
   /** Maximum number of visible splats. */
   readonly capacity: number;
   /** Required capacity in pairs of splat and bin. */
@@ -126,12 +126,12 @@ export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, '
 }
 
 /** Settings of rasterizers. */
-export type PaintingLevers = Pick<RenderSettings, 'transmittanceMin'>;
+export type RasterSettings = Pick<RenderSettings, 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {
   readonly surface: Surface;
-  readonly levers: PaintingLevers;
+  readonly settings: RasterSettings;
   /**
    * Premultiplied background color; the surface then receives the final image. Without it the surface receives color,
    * with the transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
@@ -168,11 +168,11 @@ export interface Rasterizer {
   /** Whether the rasterizer can write a final image of this format directly. */
   finishes(format: GPUTextureFormat): boolean;
   /** Required bytes of each buffer of {@link RasterizerInputs.spare}. */
-  spareBytes(room: Room): number;
+  pingPongBytes(room: Room): number;
   /** Binds the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Compiles the pipelines for other settings, so that no frame has to. @param format Format of the targets. */
-  prepare(levers: PaintingLevers, format: GPUTextureFormat, painter?: TilePainter): void;
+  prepare(settings: RasterSettings, format: GPUTextureFormat, painter?: TilePainter): void;
   /** Records the common work of all slices of a frame, before the first of them. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
   /** Records one slice of a frame. Slices are submitted one by one. */

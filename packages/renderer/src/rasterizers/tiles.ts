@@ -8,13 +8,13 @@ import { TRAINED_TRANSMITTANCE } from '../render-settings.js';
 import type {
   AccumulationFormat,
   Painting,
-  PaintingLevers,
+  RasterSettings,
   Rasterizer,
   RasterizerInputs,
   Room,
   Slice,
 } from './rasterizer.js';
-import { pairBuffers, spareBytesOf, type PairBuffers } from './pair-buffers.js';
+import { pairBuffers, releasableBytesOf, type PairBuffers } from './pair-buffers.js';
 import { listingKernels, type ListingKernels, type PaintedTiles, type RasterizeVariant } from './tile-kernels.js';
 import { PlainPainter, type TilePainter } from './tile-painter.js';
 
@@ -55,7 +55,7 @@ const MAX_GRIDS = 12;
  * At the threshold of training, the splat that would go below it is rejected; at higher ones it is the last one that is
  * blended.
  */
-const refusesLast = ({ transmittanceMin }: PaintingLevers): boolean => transmittanceMin <= TRAINED_TRANSMITTANCE;
+const refusesLast = ({ transmittanceMin }: RasterSettings): boolean => transmittanceMin <= TRAINED_TRANSMITTANCE;
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
@@ -104,8 +104,8 @@ export class TilesRasterizer implements Rasterizer {
     return STORABLE.includes(format) || (needsFeature && this.#device.features.has('bgra8unorm-storage'));
   }
 
-  spareBytes(room: Room): number {
-    return spareBytesOf(room);
+  pingPongBytes(room: Room): number {
+    return releasableBytesOf(room);
   }
 
   bind(inputs: RasterizerInputs): void {
@@ -114,10 +114,10 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = pairBuffers(this.#memory, inputs);
   }
 
-  prepare(levers: PaintingLevers, format: GPUTextureFormat, painter: TilePainter = this.#plain): void {
+  prepare(settings: RasterSettings, format: GPUTextureFormat, painter: TilePainter = this.#plain): void {
     listingKernels(this.#device, painter.tile);
     const prepare = (own: Pick<RasterizeVariant, 'format' | 'isFinal'>): unknown =>
-      painter.kernel({ ...own, refusesLast: refusesLast(levers) }).prepare();
+      painter.kernel({ ...own, refusesLast: refusesLast(settings) }).prepare();
     if (this.finishes(format)) prepare({ format, isFinal: true });
     prepare({ format: this.#accumulation, isFinal: false });
   }
@@ -143,7 +143,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, painter = this.#plain, timer } = painting;
+    const { surface, settings, background, painter = this.#plain, timer } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(painting, this.#inputs, this.#buffers);
     // Tiles are interleaved, so that all slices of a frame have long and short lists.
@@ -158,7 +158,7 @@ export class TilesRasterizer implements Rasterizer {
     });
     const kernel = painter.kernel({
       ...{ format: surface.format, isFinal: background !== undefined },
-      refusesLast: refusesLast(levers),
+      refusesLast: refusesLast(settings),
     });
     kernel.dispatch(paint, painter.bind(kernel, this.#painted(bound, surface.view)), groups);
     paint.end();
@@ -248,14 +248,14 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #writeView(
-    { surface: { width, height }, levers, background = TRANSPARENT }: Painting,
+    { surface: { width, height }, settings, background = TRANSPARENT }: Painting,
     { columns, rows }: Grid,
     { index, count }: Slice,
   ): void {
     const { capacity, pairCapacity } = this.#inputs!;
     const room = { pair_capacity: pairCapacity, splat_groups: groupsOf(capacity) };
     const image = { viewport: [width, height], bins: [columns, rows], background, part: index, parts: count };
-    writeStruct(layouts.BinView, { ...room, ...image, transmittance_min: levers.transmittanceMin }, this.#viewBytes);
+    writeStruct(layouts.BinView, { ...room, ...image, transmittance_min: settings.transmittanceMin }, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
 }

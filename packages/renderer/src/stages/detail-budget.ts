@@ -7,10 +7,10 @@ export interface DetailBudget {
   /** Counts one block; `lod_counts` must be 0 before the first. */
   readonly count: Stage<typeof detailCount>;
   /** Runs after the last block. */
-  readonly allow: Stage<typeof detailAllow>;
+  readonly threshold: Stage<typeof detailAllow>;
 }
 
 export const detailBudgetOn = (device: GPUDevice): DetailBudget => ({
   count: new Stage(device, detailCount, constants.CULL_GROUP * constants.DETAIL_THREADS),
-  allow: new Stage(device, detailAllow),
+  threshold: new Stage(device, detailAllow),
 });

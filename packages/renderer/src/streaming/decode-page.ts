@@ -10,7 +10,7 @@ import {
   CLASS_STEP,
   DIFFERENCES,
   FILE_FLOATS,
-  gathered,
+  compactBits,
   headBytes,
   mostBytes,
   MIDDLE,
@@ -187,7 +187,7 @@ class PageDecoder {
         code = (code + HALF_CODE * high + low) % ALL_CODES;
         const [fine, coarse] = [code % HALF_CODE, Math.floor(code / HALF_CODE)];
         for (let axis = 0; axis < 3; axis++) {
-          codes[axis] = gathered(fine << axis) | (gathered(coarse << axis) << 8);
+          codes[axis] = compactBits(fine << axis) | (compactBits(coarse << axis) << 8);
           if (codes[axis] > most[axis]) most[axis] = codes[axis];
         }
         codes[3] = SIZE_CODES * sx[i];

@@ -82,7 +82,7 @@ export function interleaved(x: number, y: number, z: number): number {
 }
 
 /** Extracts the first of three {@link interleaved} numbers; shift for the others. */
-export function gathered(code: number): number {
+export function compactBits(code: number): number {
   let bits = (code >>> 2) & 0x249249;
   bits = (bits | (bits >>> 2)) & 0x0c30c3;
   bits = (bits | (bits >>> 4)) & 0x00f00f;

@@ -77,11 +77,11 @@ export class PageFeedback implements PageRequests {
    * Whether this frame must record requests; then {@link begin}, {@link note}, {@link copy} and, after the submit,
    * {@link read} follow.
    */
-  isDue(camera: Camera, levers: FeedbackSettings): boolean {
+  isDue(camera: Camera, settings: FeedbackSettings): boolean {
     const now = performance.now();
     this.#motion.observe(camera, now);
     const { isMoving } = this.#motion;
-    const [view, version] = [nameOf(camera, levers), this.#options.version()];
+    const [view, version] = [nameOf(camera, settings), this.#options.version()];
     const isSeen = this.#views.draw(view, version);
     const isEarly = this.#frames < (isMoving ? MOVING_INTERVAL : INTERVAL) || this.#isReading;
     const isDue = !isEarly && !(isSeen && now < this.#givesWayUntil);

@@ -4,16 +4,16 @@ import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 import { detailBudgetOn, type DetailBudget } from '../stages/detail-budget.js';
-import { ARRIVAL_MS, Arrivals } from './arrivals.js';
+import { ARRIVAL_MS, PageFadeIn } from './page-fade-in.js';
 import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
 import { NONE } from './page-list.js';
 import { PagePool, poolBytes, poolSize, slotBytes } from './page-pool.js';
 import { folderSource, type FetchPage, type PageSource } from './page-source.js';
-import { PageTraffic } from './page-traffic.js';
-import { PlacedRows } from './placed-rows.js';
+import { PageStreamer } from './page-streamer.js';
+import { TranslatedRows } from './translated-rows.js';
 import { Residency } from './residency.js';
 import type { SlotWords } from './slot-words.js';
-import { UploadPace } from './upload-pace.js';
+import { UploadBudget } from './upload-budget.js';
 import { aheadMs } from './camera-motion.js';
 import { PageFeedback } from './page-feedback.js';
 import type { ShPrecision } from '../pack/words.js';
@@ -111,11 +111,11 @@ export class StreamedGaussians implements GaussianScene {
   readonly #reservation: Reservation;
   readonly #pool: PagePool;
   readonly #residency: Residency;
-  readonly #traffic: PageTraffic<readonly SlotWords[]>;
-  readonly #pace = new UploadPace();
+  readonly #traffic: PageStreamer<readonly SlotWords[]>;
+  readonly #pace = new UploadBudget();
   readonly #slotBytes: number;
-  readonly #rows: PlacedRows;
-  readonly #arrivals: Arrivals;
+  readonly #rows: TranslatedRows;
+  readonly #arrivals: PageFadeIn;
   #upload: Upload | undefined;
   #isDestroyed = false;
   #lacking = 0;
@@ -160,7 +160,7 @@ export class StreamedGaussians implements GaussianScene {
     }
     this.pages = this.#pool.pages;
     this.#residency = new Residency(list, slots, source.isCached);
-    this.#traffic = new PageTraffic(this.#residency, {
+    this.#traffic = new PageStreamer(this.#residency, {
       fetch: async (page, signal) => {
         const words = await source.fetch(page, signal);
         signal.throwIfAborted();
@@ -169,9 +169,9 @@ export class StreamedGaussians implements GaussianScene {
       onArrival: () => this.#options.onChange?.(),
       onError: (error) => this.#options.onError?.(error),
     });
-    this.#rows = new PlacedRows(list, this.#residency, scene);
+    this.#rows = new TranslatedRows(list, this.#residency, scene);
     this.#slotBytes = slotBytes(scene);
-    this.#arrivals = new Arrivals(list, options.arrivalMs ?? ARRIVAL_MS, (page, arrived) =>
+    this.#arrivals = new PageFadeIn(list, options.arrivalMs ?? ARRIVAL_MS, (page, arrived) =>
       this.#rows.setArrived(page, arrived),
     );
   }

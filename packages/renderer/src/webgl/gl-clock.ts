@@ -1,13 +1,13 @@
 import type { WorkTime } from '../gpu/queue-clock.js';
 
 /** Time of the notification that work was done, and of the last check before it, by the page's clock. */
-interface Told {
+interface ObservedTime {
   readonly now: number;
   readonly since: number;
 }
 
 /** Resolves when all commands up to now have completed. Rejects if the context is lost. */
-export async function drawn(gl: WebGL2RenderingContext): Promise<Told> {
+export async function drawn(gl: WebGL2RenderingContext): Promise<ObservedTime> {
   const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
   let since = performance.now();
@@ -28,7 +28,7 @@ export async function drawn(gl: WebGL2RenderingContext): Promise<Told> {
 /** Times frames as a page experiences them: the WebGL counterpart of `QueueClock`. */
 export class GlClock {
   readonly #gl: WebGL2RenderingContext;
-  #last: Told = { now: -Infinity, since: -Infinity };
+  #last: ObservedTime = { now: -Infinity, since: -Infinity };
 
   constructor(gl: WebGL2RenderingContext) {
     this.#gl = gl;
@@ -44,12 +44,12 @@ export class GlClock {
     draw();
     // If the browser draws synchronously, the thread was busy for the whole time.
     const busy = performance.now() - begin;
-    const told = await drawn(this.#gl);
+    const observed = await drawn(this.#gl);
     // Time of the previous frame, which may not have completed when this one was drawn.
     const before = this.#last;
-    this.#last = told;
-    const atMost = told.now - Math.max(begin, before.since);
-    const atLeast = Math.min(atMost, Math.max(least, busy, told.since - Math.max(begin, before.now)));
-    return { doneAt: told.now, atLeast, atMost };
+    this.#last = observed;
+    const atMost = observed.now - Math.max(begin, before.since);
+    const atLeast = Math.min(atMost, Math.max(least, busy, observed.since - Math.max(begin, before.now)));
+    return { doneAt: observed.now, atLeast, atMost };
   }
 }

@@ -238,8 +238,8 @@ function depthFormats(gl: WebGL2RenderingContext, isCanvas: boolean): GLenum[] {
   const bits = ask(depth, gl.FRAMEBUFFER_ATTACHMENT_DEPTH_SIZE);
   const [alone, both] =
     bits > 24 ? [gl.DEPTH_COMPONENT32F, gl.DEPTH32F_STENCIL8] : [gl.DEPTH_COMPONENT24, gl.DEPTH24_STENCIL8];
-  const likely = isCanvas || has(stencil) ? [both, alone] : [alone, both];
-  return bits > 16 ? likely : [gl.DEPTH_COMPONENT16, ...likely];
+  const preferred = isCanvas || has(stencil) ? [both, alone] : [alone, both];
+  return bits > 16 ? preferred : [gl.DEPTH_COMPONENT16, ...preferred];
 }
 
 const noDepth = (found: string): GaussianSplatError =>

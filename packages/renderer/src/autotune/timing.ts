@@ -6,13 +6,13 @@ import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
 import type { PackedGaussians } from '../pack/pack.js';
 import { faultsOf, type Variants } from '../variants.js';
-import { faultOf, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
+import { faultOf, packSpheres, probeCamera, sphereCloud, viewpointOf } from './self-test.js';
 
 /** Frames in one trial. */
 export const FRAMES = 4;
 
 /** A scene, and the image size in pixels. */
-export interface Trial {
+export interface TimingScene {
   readonly scene: () => PackedGaussians;
   readonly width: number;
   readonly height: number;
@@ -22,7 +22,7 @@ export interface Trial {
  * Whether a variant passes the self-test, cached for each device.
  * @param format Format of the frames to come: their pipelines are compiled meanwhile.
  */
-export const isRight = (device: GPUDevice, variants: Variants, format?: GPUTextureFormat): Promise<boolean> =>
+export const passes = (device: GPUDevice, variants: Variants, format?: GPUTextureFormat): Promise<boolean> =>
   perDevice(device, `right ${JSON.stringify(variants)}`, async () => {
     await madeTogether(device, () => prepare(device, variants, format ?? ANSWER_TARGET.format));
     let fault: string | undefined = 'WebGPU calls of the self-test, which it refuses';
@@ -55,7 +55,7 @@ const PAGE_TARGET = {
 } as const;
 
 /** Smallest scene of the trials. */
-const SMALL: Trial = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 'int8'), width: 320, height: 180 };
+const SMALL: TimingScene = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 'int8'), width: 320, height: 180 };
 
 /** Whether a variant passes the self-test and draws a small frame within this many milliseconds. */
 export async function isGoodStart(
@@ -64,7 +64,7 @@ export async function isGoodStart(
   quickMs: number,
   format?: GPUTextureFormat,
 ): Promise<boolean> {
-  if (!(await isRight(device, variants, format))) return false;
+  if (!(await passes(device, variants, format))) return false;
   const clock = await FrameClock.on(device);
   // Uses the target of the self-test, so that no pipeline is compiled for this trial alone.
   return (await timeFrames(device, variants, SMALL, clock, ANSWER_TARGET)) <= quickMs;
@@ -74,7 +74,7 @@ export async function isGoodStart(
 export async function timeFrames(
   device: GPUDevice,
   variants: Variants,
-  { scene, width, height }: Trial,
+  { scene, width, height }: TimingScene,
   clock: FrameClock,
   target: { readonly format: GPUTextureFormat; readonly usage: number } = PAGE_TARGET,
 ): Promise<number> {

@@ -25,7 +25,7 @@ interface RowRange {
 }
 
 /** Finds the regions of a generator's tensors for the bindings of `ingest`. */
-export class TensorPlaces {
+export class TensorBindings {
   readonly #layout: GaussianLayout;
   readonly #elementBytes: number;
   readonly #slices: Readonly<Record<Binding, AttributeSlice | undefined>>;

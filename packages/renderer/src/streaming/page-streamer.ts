@@ -18,7 +18,7 @@ const MEMORY = 0.95;
 const RETRY_MS = 4_000;
 const MOST_TRIES = 8;
 /** Milliseconds after a failure before pages that did not fit beside it are tried again, once for many failures. */
-const ANEW_MS = 250;
+const RECHECK_MS = 250;
 
 /** A fetched page. */
 export interface FetchedPage<Words> {
@@ -40,7 +40,7 @@ export interface TrafficOptions<Words> {
  * Streams pages from the server to slots: the most needed are fetched and uploaded first, a bounded number is in
  * transit, and pages that are no longer requested are canceled at any stage.
  */
-export class PageTraffic<Words> {
+export class PageStreamer<Words> {
   readonly #residency: Residency;
   readonly #options: TrafficOptions<Words>;
   readonly #fetching = new Map<number, AbortController>();
@@ -143,8 +143,8 @@ export class PageTraffic<Words> {
     // The reserved slots are available to other pages.
     this.#anew ??= setTimeout(() => {
       this.#anew = undefined;
-      this.#askAnew();
-    }, ANEW_MS);
+      this.#recheck();
+    }, RECHECK_MS);
   }
 
   /** A view at rest runs no feedback pass, so the last requests are repeated. */
@@ -153,12 +153,12 @@ export class PageTraffic<Words> {
       this.#retry = undefined;
       const { due, isMore } = this.#failures.takeDue();
       if (isMore) this.#retryLater();
-      if (due.some((page) => this.#residency.need(page) > 0)) this.#askAnew();
+      if (due.some((page) => this.#residency.need(page) > 0)) this.#recheck();
     }, RETRY_MS);
   }
 
   /** Repeats all requests of the last feedback pass, including failed ones. */
-  #askAnew(): void {
+  #recheck(): void {
     this.#residency.rebuildMissing();
     this.sendForMore();
   }

@@ -2,12 +2,12 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { mortonOrder } from '../pack/morton.js';
 import type { PackedGaussians } from '../pack/pack.js';
-import { LIKELY, SAFE, type Variants } from '../variants.js';
-import { packSpheres, sphereCloud } from './known-answer.js';
-import { FrameClock, FRAMES, isRight, timeFrames, type Trial } from './trials.js';
+import { PREFERRED, FALLBACK, type Variants } from '../variants.js';
+import { packSpheres, sphereCloud } from './self-test.js';
+import { FrameClock, FRAMES, passes, timeFrames, type TimingScene } from './timing.js';
 
 /** Rounds run until one candidate is left, or the time is up. */
-export const ROUNDS: readonly Trial[] = [
+export const ROUNDS: readonly TimingScene[] = [
   { scene: () => spheres(1), width: 320, height: 180 },
   { scene: () => spheres(16), width: 1920, height: 1080 },
 ];
@@ -21,7 +21,7 @@ const HOPELESS = 1.5;
 const MEASURABLE = 1.5;
 
 /** Variants for software adapters: tiles need barriers, which are slow there. float32 quads need no conversion. */
-const SERIAL: Variants = { ...SAFE, threads: 'serial' };
+const SERIAL: Variants = { ...FALLBACK, threads: 'serial' };
 const PRECISE: Variants = { ...SERIAL, accumulation: 'rgba32float' };
 /** Milliseconds of the smallest trial that no GPU exceeds. */
 const NO_GPU_MS = 60;
@@ -30,25 +30,25 @@ type Pause = () => Promise<void>;
 /** Returns the fastest variants that draw the right image on a device; undefined if none does. */
 export async function searchVariants(device: GPUDevice, pause: Pause): Promise<Variants | undefined> {
   const processors = device.features.has('float32-blendable') ? [SERIAL, PRECISE] : [SERIAL];
-  const likely = device.adapterInfo?.isFallbackAdapter ? processors : [LIKELY, SAFE];
-  const candidates = await rightOf(device, likely, pause);
+  const preferred = device.adapterInfo?.isFallbackAdapter ? processors : [PREFERRED, FALLBACK];
+  const candidates = await rightOf(device, preferred, pause);
   const clock = await FrameClock.on(device);
   // A software adapter that does not report itself as one.
-  if (likely !== processors && !(await isQuick(device, candidates, clock)))
+  if (preferred !== processors && !(await isQuick(device, candidates, clock)))
     candidates.push(...(await rightOf(device, processors, pause)));
   if (candidates.length > 0) return chooseFastest(device, candidates, clock, pause);
-  for (const candidate of LAST_RESORTS) if (await isRight(device, candidate)) return candidate;
+  for (const candidate of LAST_RESORTS) if (await passes(device, candidate)) return candidate;
   return undefined;
 }
 
 /** Variants that are right, however slow: their speed excluded them before. */
-const LAST_RESORTS: readonly Variants[] = [LIKELY, SAFE, SERIAL, { ...LIKELY, threads: 'serial' }];
+const LAST_RESORTS: readonly Variants[] = [PREFERRED, FALLBACK, SERIAL, { ...PREFERRED, threads: 'serial' }];
 
 async function rightOf(device: GPUDevice, candidates: readonly Variants[], pause: Pause): Promise<Variants[]> {
   const right: Variants[] = [];
   for (const candidate of candidates) {
     await pause();
-    if (await isRight(device, candidate)) right.push(candidate);
+    if (await passes(device, candidate)) right.push(candidate);
   }
   return right;
 }

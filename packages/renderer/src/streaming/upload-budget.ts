@@ -36,7 +36,7 @@ const FULL = 0.75;
  * never more than {@link MOST_UPLOAD_BYTES}. The fraction grows slowly while frames that use it are in time, and is
  * halved when one is late (additive increase, multiplicative decrease: Chiu and Jain, 1989).
  */
-export class UploadPace {
+export class UploadBudget {
   #milliseconds = FIRST_MS;
   #bytes = FIRST_BYTES;
   #frameAt = -Infinity;

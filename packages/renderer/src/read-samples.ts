@@ -9,7 +9,7 @@ const { CULL_GROUP } = constants;
 const RUN_BYTES = 4 * GEOMETRY_WORDS * CULL_GROUP;
 
 /** Centers and opacities of splats. */
-export interface Places {
+export interface Samples {
   readonly count: number;
   /** [N, 3] relative to the origin of the scene */
   readonly positions: Float32Array;
@@ -20,7 +20,7 @@ export interface Places {
 }
 
 /** Reads evenly spaced runs of splats over the blocks back from the GPU; splats of opacity 0 are skipped. */
-export async function readPlaces(device: GPUDevice, pages: readonly GaussianPage[]): Promise<Places> {
+export async function readSamples(device: GPUDevice, pages: readonly GaussianPage[]): Promise<Samples> {
   const runs = pages.flatMap(({ geometry, count }) =>
     Array.from({ length: Math.ceil(count / CULL_GROUP) }, (_, run) => ({
       geometry,
@@ -47,13 +47,13 @@ export async function readPlaces(device: GPUDevice, pages: readonly GaussianPage
     }
     device.queue.submit([encoder.finish()]);
     await staging.mapAsync(0x1);
-    return visiblePlaces(new Uint32Array(staging.getMappedRange()));
+    return visibleSamples(new Uint32Array(staging.getMappedRange()));
   } finally {
     staging.destroy();
   }
 }
 
-function visiblePlaces(words: Uint32Array): Places {
+function visibleSamples(words: Uint32Array): Samples {
   const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
   const [positions, opacities] = [[] as number[], [] as number[]];
   let unusable = 0;

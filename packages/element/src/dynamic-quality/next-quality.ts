@@ -1,7 +1,7 @@
 /** How much of the whole image a frame in motion can afford: a pure function of what frames took. */
-import type { Level } from './ladder.js';
+import type { QualityLevel } from './quality-levels.js';
 import { quantile } from './display-interval.js';
-import { HOLD_MS, INITIAL_PACE, type Pace, type PaceReason } from './start.js';
+import { HOLD_MS, INITIAL_QUALITY, type QualityState, type QualityReason } from './start.js';
 import { inPixels, modelOf, type TimeModel } from './time-model.js';
 
 /** What a frame took. */
@@ -14,11 +14,11 @@ export interface FrameSample {
 }
 
 /** What the level is chosen by. */
-export interface PaceRules {
+export interface QualityTargets {
   /** What a frame may take, ms. */
   readonly targetMs: number;
   /** The first is the whole image; the others lose more and more. */
-  readonly levels: readonly Level[];
+  readonly levels: readonly QualityLevel[];
 }
 
 /** Frames of which the usual ones count: a slow one now and then is no reason for anything. */
@@ -51,28 +51,32 @@ const FAR_TOO_LATE = 1.25;
 const TRIAL_MS = 6_000;
 
 /** The pace after a frame. Frames of another level are too late to say anything. */
-export function keepPace(pace: Pace, sample: FrameSample, rules: PaceRules): Pace {
-  if (sample.level !== pace.level) return pace;
-  const seen = observe(pace, sample, rules);
+export function nextQuality(state: QualityState, sample: FrameSample, rules: QualityTargets): QualityState {
+  if (sample.level !== state.level) return state;
+  const seen = observe(state, sample, rules);
   return choose(seen, sample.now, rules) ?? seen;
 }
 
 /** With what a frame says of its level and of the load. */
-function observe(pace: Pace, { now, level, milliseconds }: FrameSample, { targetMs }: PaceRules): Pace {
-  const hasRested = now - milliseconds - pace.sampledAt > REST_MS;
-  const movedAt = hasRested ? now - milliseconds : pace.movedAt;
-  const recent = [...pace.recent, Math.max(NOTHING_MS, milliseconds)].slice(-MEMORY);
+function observe(
+  state: QualityState,
+  { now, level, milliseconds }: FrameSample,
+  { targetMs }: QualityTargets,
+): QualityState {
+  const hasRested = now - milliseconds - state.sampledAt > REST_MS;
+  const movedAt = hasRested ? now - milliseconds : state.movedAt;
+  const recent = [...state.recent, Math.max(NOTHING_MS, milliseconds)].slice(-MEMORY);
   const usual = usualOf(recent);
   const isWaking = hasRested || now - movedAt < WAKING_MS;
-  const step = isWaking ? 0 : Math.min(LONGEST_STEP_MS, now - pace.sampledAt);
-  const most = (pace.believed || AIM * targetMs) * GROWTH ** (step / 1000);
-  let { measured } = pace;
-  const load = pace.load || usual;
+  const step = isWaking ? 0 : Math.min(LONGEST_STEP_MS, now - state.sampledAt);
+  const most = (state.smoothedMs || AIM * targetMs) * GROWTH ** (step / 1000);
+  let { measured } = state;
+  const load = state.load || usual;
   // While the memory fills, the load is taken to be that of before the change.
-  if (pace.recent.length < MEMORY && recent.length >= LEAST)
+  if (state.recent.length < MEMORY && recent.length >= LEAST)
     measured = { ...measured, [level]: { share: usual / load, at: now, load } };
-  const believed = recent.length < LEAST ? pace.believed : Math.max(LITTLE * targetMs, Math.min(most, usual));
-  return { ...pace, recent, movedAt, sampledAt: now, load, measured, believed };
+  const smoothedMs = recent.length < LEAST ? state.smoothedMs : Math.max(LITTLE * targetMs, Math.min(most, usual));
+  return { ...state, recent, movedAt, sampledAt: now, load, measured, smoothedMs };
 }
 
 /** Usual time of a frame, ms: the mean of the middle half. The answers for two frames that wait for one another may arrive together, so a median would alternate. */
@@ -83,15 +87,15 @@ function usualOf(recent: readonly number[]): number {
 }
 
 /** The next level, or null where it stays. */
-function choose(pace: Pace, now: number, rules: PaceRules): Pace | null {
-  const { level, recent, measured } = pace;
+function choose(state: QualityState, now: number, rules: QualityTargets): QualityState | null {
+  const { level, recent, measured } = state;
   if (recent.length < LEAST) return null;
   const usual = usualOf(recent);
   const load = usual / measured[level].share;
   const model = modelOf(rules.levels, measured, { now, level, load });
   const times = model.shares.map((share) => share * load);
-  if (pace.believed > LATE * rules.targetMs) return whereLate(pace, now, times, model, rules);
-  return level > 0 ? whereInTime(pace, now, times, model, rules) : null;
+  if (state.smoothedMs > LATE * rules.targetMs) return whereLate(state, now, times, model, rules);
+  return level > 0 ? whereInTime(state, now, times, model, rules) : null;
 }
 
 /** The most accurate level that is predicted in time, else one of the fastest. */
@@ -101,8 +105,14 @@ function bestOf(times: readonly number[], targetMs: number): number {
   return times.findIndex((time) => time <= within);
 }
 
-function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeModel, rules: PaceRules): Pace | null {
-  const { level, recent, direction, turnedAt } = pace;
+function whereLate(
+  state: QualityState,
+  now: number,
+  times: number[],
+  { isKnown }: TimeModel,
+  rules: QualityTargets,
+): QualityState | null {
+  const { level, recent, direction, turnedAt } = state;
   const { targetMs } = rules;
   const usual = times[level];
   let to = bestOf(times, targetMs);
@@ -118,12 +128,18 @@ function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeMo
   const isUrgent = to > level && usual > FAR_TOO_LATE * targetMs && times[to] <= targetMs;
   if (isTurn && isSoon && !isUrgent) return null;
   if (to < level && recent.length < ENOUGH) return null;
-  return change(pace, now, to, 'slow', times[to]);
+  return change(state, now, to, 'slow', times[to]);
 }
 
 /** Up, where that is predicted in time; after a while without a change, one level up where that may be. */
-function whereInTime(pace: Pace, now: number, times: number[], { isKnown }: TimeModel, rules: PaceRules): Pace | null {
-  const { level, recent, changedAt, turnedAt, direction, hold } = pace;
+function whereInTime(
+  state: QualityState,
+  now: number,
+  times: number[],
+  { isKnown }: TimeModel,
+  rules: QualityTargets,
+): QualityState | null {
+  const { level, recent, changedAt, turnedAt, direction, hold } = state;
   const { levels, targetMs } = rules;
   if (recent.length < ENOUGH) return null;
   if (direction === 'down' && now - turnedAt < hold) return null;
@@ -131,48 +147,54 @@ function whereInTime(pace: Pace, now: number, times: number[], { isKnown }: Time
   const mostOf = (other: number): number =>
     isKnown[other] ? times[other] : (times[level] * inPixels(levels[other], other)) / inPixels(levels[level], level);
   const to = times.findIndex((time, other) => time <= AIM * targetMs && mostOf(other) <= targetMs);
-  if (to !== -1 && to < level) return change(pace, now, to, 'spare', times[to]);
+  if (to !== -1 && to < level) return change(state, now, to, 'spare', times[to]);
   const above = level - 1;
   const mayBe = times[above] <= targetMs && mostOf(above) <= FAR_TOO_LATE * targetMs;
   const isTried = now - changedAt > TRIAL_MS && !isKnown[above] && mayBe;
-  return isTried ? change(pace, now, above, 'trial', times[above]) : null;
+  return isTried ? change(state, now, above, 'trial', times[above]) : null;
 }
 
-function change(pace: Pace, now: number, level: number, reason: PaceReason, predicted: number): Pace {
-  const { recent, measured, changedAt } = pace;
-  const load = quantile(recent.slice(-ENOUGH), 0.5) / measured[pace.level].share;
-  const direction = level > pace.level ? 'down' : 'up';
-  const turns = direction !== pace.direction;
-  const isRegretted = direction === 'down' && turns && now - changedAt < HOLD_MS;
+function change(
+  state: QualityState,
+  now: number,
+  level: number,
+  reason: QualityReason,
+  predicted: number,
+): QualityState {
+  const { recent, measured, changedAt } = state;
+  const load = quantile(recent.slice(-ENOUGH), 0.5) / measured[state.level].share;
+  const direction = level > state.level ? 'down' : 'up';
+  const turns = direction !== state.direction;
+  const isOscillation = direction === 'down' && turns && now - changedAt < HOLD_MS;
   return {
-    ...pace,
+    ...state,
     level,
     reason,
     recent: [],
-    believed: predicted,
+    smoothedMs: predicted,
     changedAt: now,
-    turnedAt: turns ? now : pace.turnedAt,
+    turnedAt: turns ? now : state.turnedAt,
     direction,
-    hold: direction === 'up' ? pace.hold : isRegretted ? Math.min(LONGEST_HOLD_MS, LONGER * pace.hold) : HOLD_MS,
+    hold: direction === 'up' ? state.hold : isOscillation ? Math.min(LONGEST_HOLD_MS, LONGER * state.hold) : HOLD_MS,
     load,
-    measured: { ...measured, [pace.level]: { ...measured[pace.level], at: now, load } },
+    measured: { ...measured, [state.level]: { ...measured[state.level], at: now, load } },
   };
 }
 
 /** The pace where other levels serve an image of the same size: what was measured of those that stay counts on. */
-export function limited(pace: Pace, levels: readonly Level[]): Pace {
+export function limited(state: QualityState, levels: readonly QualityLevel[]): QualityState {
   const last = levels.length - 1;
-  return pace.level <= last ? pace : { ...pace, level: last, recent: [], believed: 0 };
+  return state.level <= last ? state : { ...state, level: last, recent: [], smoothedMs: 0 };
 }
 
 /**
  * The pace where images have so many times the pixels, and other levels may serve: what was measured says nothing of these. Fewer pixels are drawn with as
  * many of them as before, for they take no longer.
  */
-export function resized(pace: Pace, growth: number, levels: readonly Level[]): Pace {
-  const level = Math.min(pace.level, levels.length - 1);
+export function resized(state: QualityState, growth: number, levels: readonly QualityLevel[]): QualityState {
+  const level = Math.min(state.level, levels.length - 1);
   const pixels = inPixels(levels[level], level);
   const asMany = levels.findIndex((other, number) => growth * inPixels(other, number) <= pixels);
-  const { reason, sampledAt, movedAt } = pace;
-  return { ...INITIAL_PACE, level: asMany === -1 ? level : Math.min(level, asMany), reason, sampledAt, movedAt };
+  const { reason, sampledAt, movedAt } = state;
+  return { ...INITIAL_QUALITY, level: asMany === -1 ? level : Math.min(level, asMany), reason, sampledAt, movedAt };
 }

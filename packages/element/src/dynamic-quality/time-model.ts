@@ -1,5 +1,5 @@
 /** What frames on the levels take: `a + b * pixels` on those that are reduced, a time of its own for the whole image, learned from what they took. */
-import type { Level } from './ladder.js';
+import type { QualityLevel } from './quality-levels.js';
 
 /** What is supposed until it is measured: the share of a reduced frame that fewer pixels leave, and what the whole image takes beyond a reduced one of as many pixels. */
 const FIXED = 0.2;
@@ -30,7 +30,7 @@ export interface TimeModel {
 }
 
 /** What a level takes, as against others, where all of it is in the pixels. */
-export const inPixels = ({ scale }: Level, level: number): number => (level === 0 ? WHOLE : scale ** 2);
+export const inPixels = ({ scale }: QualityLevel, level: number): number => (level === 0 ? WHOLE : scale ** 2);
 
 const supposed = (pixels: number): number => FIXED + (1 - FIXED) * pixels;
 
@@ -43,7 +43,11 @@ export interface Moment {
 }
 
 /** The model of a moment, which says what still counts of what was measured. */
-export function modelOf(levels: readonly Level[], measured: MeasuredLevels, { now, level, load }: Moment): TimeModel {
+export function modelOf(
+  levels: readonly QualityLevel[],
+  measured: MeasuredLevels,
+  { now, level, load }: Moment,
+): TimeModel {
   const isKnown = levels.map((_, other) => {
     const found = measured[other] as Measured | undefined;
     if (found === undefined || other === level) return other === level;

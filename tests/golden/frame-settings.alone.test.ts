@@ -37,23 +37,23 @@ const views = Array.from({ length: 3 }, (_, k) => cameraAt([0.6 + 0.2 * k, -0.5,
 const isSame = (a: Float32Array, b: Float32Array): boolean => a.length === b.length && a.every((v, i) => v === b[i]);
 
 for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
-  // Every mix of shader levers is seconds of compiling for tiles here.
+  // Every mix of shader settings is seconds of compiling for tiles here.
   const mixes = rasterizer === 'quads' ? MIXES : MIXES.slice(1);
-  test(`${rasterizer}: a frame's levers draw what a renderer of those levers draws, and the next frame without is whole`, async () => {
+  test(`${rasterizer}: a frame's settings draw what a renderer of those settings draws, and the next frame without is whole`, async () => {
     const device = await serialDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const own = new Renderer(device, { rasterizer });
     const plain = new Renderer(device, { rasterizer });
-    for (const levers of mixes) {
-      const fixed = new Renderer(device, { rasterizer, ...levers });
+    for (const settings of mixes) {
+      const fixed = new Renderer(device, { rasterizer, ...settings });
       for (const camera of views) {
-        const mixed = await readFrame(device, own, { gaussians, camera, settings: levers });
+        const mixed = await readFrame(device, own, { gaussians, camera, settings: settings });
         const expected = await readFrame(device, fixed, { gaussians, camera });
         assert.ok(
           mixed.some((value) => value > 0.1),
           'something is in view',
         );
-        assert.ok(isSame(mixed, expected), `${JSON.stringify(levers)}: ${psnr(mixed, expected, { channels: 4 })} dB`);
+        assert.ok(isSame(mixed, expected), `${JSON.stringify(settings)}: ${psnr(mixed, expected, { channels: 4 })} dB`);
       }
       const whole = await readFrame(device, own, { gaussians, camera: views[0] });
       assert.ok(isSame(whole, await readFrame(device, plain, { gaussians, camera: views[0] })), 'the next frame');
@@ -81,17 +81,17 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
       const original = device[name].bind(device) as (descriptor: never) => never;
       Object.assign(device, { [name]: (descriptor: never) => (made.push(name), original(descriptor)) });
     }
-    const draw = (levers?: Partial<PerFrameSettings>): void => {
-      for (const camera of views) renderer.render({ gaussians, camera, target, settings: levers });
+    const draw = (settings?: Partial<PerFrameSettings>): void => {
+      for (const camera of views) renderer.render({ gaussians, camera, target, settings: settings });
     };
     draw();
     made.length = 0;
-    for (const levers of mixes) draw(levers);
-    assert.deepEqual(made, [], 'pipelines of prepared levers');
+    for (const settings of mixes) draw(settings);
+    assert.deepEqual(made, [], 'pipelines of prepared settings');
     const counter = countWork(device);
     counter.take();
     const before = renderer.byteLength;
-    for (const levers of [...mixes, undefined, ...mixes]) draw(levers);
+    for (const settings of [...mixes, undefined, ...mixes]) draw(settings);
     assert.equal(counter.take().bytesAllocated, 0);
     assert.equal(renderer.byteLength, before);
     renderer.destroy();
@@ -106,15 +106,15 @@ test('a smaller picture is enlarged the same by a compute shader as by drawing',
   const tiles = new Renderer(device, { rasterizer: 'tiles' });
   const counter = countWork(device);
   const background = [0.1, 0.2, 0.3, 0.5] as const;
-  for (const levers of MIXES) {
-    const request = { gaussians, camera: views[0], background, settings: levers };
+  for (const settings of MIXES) {
+    const request = { gaussians, camera: views[0], background, settings: settings };
     counter.take();
     const stored = await readFrame(device, tiles, request);
     assert.equal(counter.take().renderPasses, 0, 'stored');
     const drawn = await readFrame(device, tiles, request, GPUTextureUsage.RENDER_ATTACHMENT);
     assert.equal(counter.take().renderPasses, 1, 'drawn');
     const worst = stored.reduce((most, value, i) => Math.max(most, Math.abs(value - drawn[i])), 0);
-    assert.ok(stored.some((value) => value > 0.6) && worst < 1e-5, `${JSON.stringify(levers)}: ${worst}`);
+    assert.ok(stored.some((value) => value > 0.6) && worst < 1e-5, `${JSON.stringify(settings)}: ${worst}`);
   }
   tiles.destroy();
   gaussians.destroy();
@@ -129,14 +129,14 @@ test('a lever out of range is refused', async () => {
 test('values that a lever does not know are refused', async () => {
   const device = await serialDevice();
   const renderer = new Renderer(device);
-  const refused = (levers: object) => [
-    () => new Renderer(device, levers),
-    () => renderer.prepare([levers], 'rgba8unorm'),
+  const refused = (settings: object) => [
+    () => new Renderer(device, settings),
+    () => renderer.prepare([settings], 'rgba8unorm'),
   ];
   const ofFrames = [0, 8, 20, 40, -8, 'x'].map((depthKeyBits) => ({ depthKeyBits }));
   const degrees = [-1, 0.5, 1.5, 4, NaN].map((shDegree) => ({ shDegree }));
-  for (const levers of [...ofFrames, ...degrees]) {
-    for (const use of refused(levers)) assert.throws(use, { code: 'argument/value' }, JSON.stringify(levers));
+  for (const settings of [...ofFrames, ...degrees]) {
+    for (const use of refused(settings)) assert.throws(use, { code: 'argument/value' }, JSON.stringify(settings));
   }
   const names = { rasterizer: 'tile', threads: 'many', accumulation: 'rgba8unorm' };
   for (const [name, found] of Object.entries(names)) {

@@ -1,8 +1,8 @@
 import { loadModule } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
-import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
-import { keyFor, pageStore, readChoice, writeChoice, type AutotuneStore } from './kept-choice.js';
-import type * as trials from './trials.js';
+import { PREFERRED, setVariants, FALLBACK, type Variants } from '../variants.js';
+import { keyFor, pageStore, readStored, writeStored, type AutotuneStore } from './store.js';
+import type * as trials from './timing.js';
 
 export interface AutotuneOptions {
   /** Default: the `localStorage` of the page, if it has one. null: no storage. */
@@ -32,7 +32,7 @@ const MAP_READ = 1;
 const QUICK_MS = 8;
 
 /** The self-test, loaded while the bytes of a scene are in transit. */
-const loadTrials = (): Promise<typeof trials> => loadModule('the self-test of the GPU', () => import('./trials.js'));
+const loadTiming = (): Promise<typeof trials> => loadModule('the self-test of the GPU', () => import('./timing.js'));
 
 /**
  * Finds variants for an early first frame, once for each device: the stored ones of an earlier visit; else the variants
@@ -47,12 +47,13 @@ export function startVariants(device: GPUDevice, options: StartOptions = {}): Pr
 
 async function start(device: GPUDevice, options: StartOptions, choice: Choice): Promise<Variants> {
   const { store = pageStore(), quickMs = QUICK_MS, format } = options;
-  const isOpen = !device.adapterInfo?.isFallbackAdapter && readChoice(store, device) === undefined;
+  const isOpen = !device.adapterInfo?.isFallbackAdapter && readStored(store, device) === undefined;
   const isGood =
-    isOpen && (await measured('start', async () => (await loadTrials()).isGoodStart(device, LIKELY, quickMs, format)));
+    isOpen &&
+    (await measured('start', async () => (await loadTiming()).isGoodStart(device, PREFERRED, quickMs, format)));
   if (!isGood) return autotune(device, options);
-  if (!choice.chosen) remember(device, LIKELY);
-  return LIKELY;
+  if (!choice.chosen) setVariants(device, PREFERRED);
+  return PREFERRED;
 }
 
 /**
@@ -70,15 +71,15 @@ export function autotune(device: GPUDevice, options: AutotuneOptions = {}): Prom
 
 async function choose(device: GPUDevice, options: AutotuneOptions): Promise<Variants> {
   const { store = pageStore(), pause = noPause, format } = options;
-  const kept = readChoice(store, device);
+  const kept = readStored(store, device);
   const variants =
-    kept !== undefined && (await (await loadTrials()).isRight(device, kept, format))
+    kept !== undefined && (await (await loadTiming()).passes(device, kept, format))
       ? kept
       : await search(device, pause);
   // Results of a lost device say nothing about the adapter, so they are not stored for its other devices.
-  if (!(await isAlive(device))) return SAFE;
-  remember(device, variants);
-  writeChoice(store, keyFor(device), variants);
+  if (!(await isAlive(device))) return FALLBACK;
+  setVariants(device, variants);
+  writeStored(store, keyFor(device), variants);
   return variants;
 }
 
@@ -102,7 +103,7 @@ async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Va
     const found = await searchVariants(device, timedPause);
     if (found) return found;
     // A wrong image is worse than none. A lost device draws none, and reports its own error.
-    if (!(await isAlive(device))) return SAFE;
+    if (!(await isAlive(device))) return FALLBACK;
     throw wrongImage(device);
   };
   return measured('search', find, detail);

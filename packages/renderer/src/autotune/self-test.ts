@@ -31,7 +31,7 @@ const SLICE_MS = 6;
 const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 
 /** Whether a renderer with these options draws the exact image of two scenes with interleaved splats. */
-export const givesKnownAnswer = async (device: GPUDevice, options: FrameSettings): Promise<boolean> =>
+export const passesSelfTest = async (device: GPUDevice, options: FrameSettings): Promise<boolean> =>
   (await faultOf(device, options)) === undefined;
 
 /** Describes the first error that a renderer with these options makes; undefined if the result is right. */

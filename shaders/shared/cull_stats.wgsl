@@ -9,4 +9,4 @@ const COVERED = 3u;
 // may cover the whole image before the sum overflows.
 const SHARE_UNIT = 4096u;
 const COVERED_UNIT = 64u;
-const GATHERED_WORDS = 4u;
+const CULL_STATS_WORDS = 4u;

@@ -7,7 +7,7 @@ import type { Residency } from './residency.js';
 import { chunkLayout, numbersOf, type ChunkLayout, type SlotWords } from './slot-words.js';
 
 /** LOD rows of all slots, page by page, which determine the weight of each chunk as pages arrive and are evicted. */
-export class PlacedRows {
+export class TranslatedRows {
   readonly #list: PageList;
   readonly #residency: Residency;
   readonly #table: DetailTable;

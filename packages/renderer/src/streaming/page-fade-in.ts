@@ -6,7 +6,7 @@ export const ARRIVAL_MS = 400;
 export const LEAST_STEPS = 16;
 
 /** Fades in pages over their parents; no page before its parent. */
-export class Arrivals {
+export class PageFadeIn {
   readonly #list: PageList;
   readonly #milliseconds: number;
   readonly #setArrived: (page: number, arrived: number) => void;

@@ -1,15 +1,17 @@
 import type { PerFrameSettings } from '@gaussian-splat/renderer';
 import type { WorkTime } from '@gaussian-splat/renderer/tools';
 import { targetMsOf, type FrameScheduler } from '../gpu/frame-scheduler.js';
-import { canFade, Fade, FADE_MS } from '../pace/fade.js';
-import { levelsFor, LADDER, type Level, type Losses } from '../pace/ladder.js';
-import { keepPace, limited, resized } from '../pace/pace.js';
-import { lossesOf } from '../pace/picture-loss.js';
-import { quantile } from '../pace/display-interval.js';
-import { INITIAL_PACE, waitForRest, type Pace, type PaceReason } from '../pace/start.js';
+import { canFade, Fade, FADE_MS } from '../dynamic-quality/fade.js';
+import { levelsForSize, QUALITY_LEVELS, type QualityLevel, type Losses } from '../dynamic-quality/quality-levels.js';
+import { nextQuality, limited, resized } from '../dynamic-quality/next-quality.js';
+import { lossesOf } from '../dynamic-quality/image-loss.js';
+import { quantile } from '../dynamic-quality/display-interval.js';
+import { INITIAL_QUALITY, waitForRest, type QualityState, type QualityReason } from '../dynamic-quality/start.js';
 
 /** All that frames in motion may be drawn with. */
-export const MOVING_LEVERS: readonly Partial<PerFrameSettings>[] = LADDER.flatMap(({ levers }) => levers ?? []);
+export const MOVING_SETTINGS: readonly Partial<PerFrameSettings>[] = QUALITY_LEVELS.flatMap(
+  ({ settings }) => settings ?? [],
+);
 
 /** A change so soon after another, ms, belongs to the same motion. */
 const MOTION_MS = 150;
@@ -24,7 +26,7 @@ const OTHER_SIZE = 1.25;
 export interface FramePlan {
   /** Number of the level; 0 is the whole image. */
   readonly level: number;
-  readonly levers: Partial<PerFrameSettings> | undefined;
+  readonly settings: Partial<PerFrameSettings> | undefined;
   /** Number of the size that pictures have. */
   readonly size: number;
 }
@@ -42,7 +44,7 @@ export interface FrameOccasion {
 }
 
 /** Draws the frame. @param onTime gets what it took */
-export type DrawFrame = (levers: FramePlan['levers'], onTime?: (time: WorkTime) => void) => void;
+export type DrawFrame = (settings: FramePlan['settings'], onTime?: (time: WorkTime) => void) => void;
 
 /** What the controller says about itself. */
 export interface DynamicQualityReport {
@@ -50,8 +52,8 @@ export interface DynamicQualityReport {
   readonly drawn: string;
   /** Name of the level of frames in motion. */
   readonly moving: string;
-  /** Why: see {@link PaceReason}. */
-  readonly reason: PaceReason;
+  /** Why: see {@link QualityReason}. */
+  readonly reason: QualityReason;
   /** Median of the last frames on that level, ms: from when a frame could begin until its work was done; null while there are none. */
   readonly frameMs: number | null;
   /** The last frame that was timed, at rest or in motion, ms; null while there is none, and with a chosen quality. */
@@ -60,7 +62,7 @@ export interface DynamicQualityReport {
   readonly targetMs: number;
 }
 
-export interface PaceOptions {
+export interface DynamicQualityOptions {
   /** False where the page has chosen a quality. */
   readonly isOn: () => boolean;
   readonly scheduler: () => FrameScheduler;
@@ -70,27 +72,27 @@ export interface PaceOptions {
   /** False where frames cost more than to be drawn: those of a post-processor. */
   readonly mayFade: () => boolean;
   /** Called for each frame of a motion that was timed: whether such are drawn whole. */
-  readonly onPace: (isWhole: boolean) => void;
+  readonly onFrameTimed: (isWhole: boolean) => void;
   /** Default: the element's. */
-  readonly levels?: readonly Level[];
+  readonly levels?: readonly QualityLevel[];
 }
 
 /**
  * Keeps moving pictures in time with the display: measures what frames take, and draws those in motion with as much as there is time for. A picture at
  * rest is the true image, 300 ms after the last motion where that takes 214 ms or less at 60 Hz.
  */
-export class PaceController {
-  readonly #options: PaceOptions;
-  #pace: Pace = INITIAL_PACE;
-  readonly #all: readonly Level[];
+export class DynamicQualityController {
+  readonly #options: DynamicQualityOptions;
+  #state: QualityState = INITIAL_QUALITY;
+  readonly #all: readonly QualityLevel[];
   /** Those that serve the image's size. */
-  #levels: readonly Level[];
+  #levels: readonly QualityLevel[];
   /** Of the pictures that the pace has measured. */
   #pixels = 0;
   /** How many sizes pictures have had: frames of another one come late. */
   #size = 0;
   #changedAt = -Infinity;
-  #drawn: Level;
+  #drawn: QualityLevel;
   /** What the last frame took, of those that are known. */
   #lastMs: number | null = null;
   /** What the last true image took, of those that are known. */
@@ -102,9 +104,9 @@ export class PaceController {
   /** The search for it that goes on. */
   #measuring: Promise<Losses> | undefined;
 
-  constructor(options: PaceOptions) {
+  constructor(options: DynamicQualityOptions) {
     this.#options = options;
-    this.#levels = this.#all = options.levels ?? LADDER;
+    this.#levels = this.#all = options.levels ?? QUALITY_LEVELS;
     this.#drawn = this.#all[0];
   }
 
@@ -114,7 +116,7 @@ export class PaceController {
   }
 
   get report(): DynamicQualityReport {
-    const { level, reason, recent } = this.#pace;
+    const { level, reason, recent } = this.#state;
     const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
     return {
       drawn: this.#drawn.name,
@@ -142,19 +144,19 @@ export class PaceController {
     // All pixels while it is not known what fewer lose.
     const isUnknown = this.#drawn.scale < 1 && !this.#losses;
     if (isUnknown) this.#drawn = this.#levels.findLast(({ scale }) => scale === 1)!;
-    render(this.#drawn.levers, (time) => {
+    render(this.#drawn.settings, (time) => {
       if (plan.level === 0) this.#fade.start(canvas);
       if (!isUnknown) this.sample(plan, time);
     });
     if (this.#measuring) return;
-    if (isUnknown || (plan.level === 0 && this.#pace.level > 0)) this.#measure(canvas, occasion.pixels);
+    if (isUnknown || (plan.level === 0 && this.#state.level > 0)) this.#measure(canvas, occasion.pixels);
   }
 
   /** @returns whether the frame was one more of the motion */
-  #settle(before: Level, canvas: HTMLCanvasElement, render: DrawFrame): boolean {
+  #settle(before: QualityLevel, canvas: HTMLCanvasElement, render: DrawFrame): boolean {
     if (this.#fade.isCovering || !canFade(canvas)) return false;
     this.#drawn = before;
-    render(before.levers);
+    render(before.settings);
     if (!this.#fade.isAwaited) void this.#fade.cover(canvas).then(this.#options.requestFrame);
     return true;
   }
@@ -186,22 +188,22 @@ export class PaceController {
     // Between two changes of one motion (a sequence of fewer pictures than the display's) what is drawn for other reasons is a part of it, until rest is due.
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
-    const level = isMotion ? this.#pace.level : 0;
+    const level = isMotion ? this.#state.level : 0;
     this.#drawn = this.#levels[level];
     if (hasChanged || level === 0) this.#cancelRest();
     const { displayInterval } = this.#options.scheduler();
     if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs + FADE_MS, displayInterval));
-    return { level, levers: this.#drawn.levers, size: this.#size };
+    return { level, settings: this.#drawn.settings, size: this.#size };
   }
 
   #fit(pixels: number): void {
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
     if (isOther) this.#losses = this.#measuring = undefined;
-    const levels = levelsFor(pixels, this.#all, this.#losses);
+    const levels = levelsForSize(pixels, this.#all, this.#losses);
     const isLimit = !isOther && this.#losses !== undefined;
     if (!isOther && levels.length === this.#levels.length) return;
     this.#levels = levels;
-    this.#pace = isLimit ? limited(this.#pace, levels) : resized(this.#pace, pixels / this.#pixels, levels);
+    this.#state = isLimit ? limited(this.#state, levels) : resized(this.#state, pixels / this.#pixels, levels);
     if (isLimit) return;
     this.#pixels = pixels;
     this.#size++;
@@ -221,15 +223,15 @@ export class PaceController {
     const milliseconds = atMost > targetMs ? atLeast : atMost;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    this.#pace = keepPace(this.#pace, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
-    const isWhole = this.#pace.level === 0;
-    if (isWhole || level > 0) this.#options.onPace(isWhole);
+    this.#state = nextQuality(this.#state, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
+    const isWhole = this.#state.level === 0;
+    if (isWhole || level > 0) this.#options.onFrameTimed(isWhole);
   }
 
   /** Another scene, or another way to draw it: nothing is known. */
   reset(): void {
     this.stop();
-    this.#pace = INITIAL_PACE;
+    this.#state = INITIAL_QUALITY;
     this.#changedAt = -Infinity;
     this.#drawn = this.#all[0];
     this.#lastMs = null;

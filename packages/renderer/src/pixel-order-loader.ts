@@ -3,16 +3,16 @@ import { perDevice } from './gpu/kernel.js';
 import type { PixelOrder } from './rasterizers/pixel-order.js';
 
 /** Device resources of `order: 'pixel'`, loaded when a frame first requests it. */
-export interface LazyOrder {
+export interface PixelOrderLoader {
   /** Undefined until it is loaded. */
   now?: PixelOrder;
   /** @throws GaussianSplatError `network/unreachable` */
   load(): Promise<unknown>;
 }
 
-export const orderOn = (device: GPUDevice): LazyOrder =>
+export const orderOn = (device: GPUDevice): PixelOrderLoader =>
   perDevice(device, 'order', () => {
-    const lazy: LazyOrder = {
+    const lazy: PixelOrderLoader = {
       load: () =>
         loadModule('the code that orders splats pixel by pixel', async () => {
           const { PixelOrder } = await import('./rasterizers/pixel-order.js');

@@ -1,11 +1,11 @@
 import { QUALITIES, type PerFrameSettings } from '@gaussian-splat/renderer';
 
 /** How frames in motion may be drawn. */
-export interface Level {
+export interface QualityLevel {
   /** For people. */
   readonly name: string;
   /** What frames are drawn with; undefined on the first level, where nothing differs from the image at rest. */
-  readonly levers: Partial<PerFrameSettings> | undefined;
+  readonly settings: Partial<PerFrameSettings> | undefined;
   /** Share of the image's width and height that is drawn. */
   readonly scale: number;
 }
@@ -26,12 +26,12 @@ const balanced: Partial<PerFrameSettings> = { depthKeyBits, transmittanceMin, de
  * All levels, from the whole image down: the settings of the quality `balanced`, which lose least for what they win, then fewer pixels. Single objects, since
  * the renderer knows settings by them. docs/frontier has the dB and the time of each.
  */
-export const LADDER: readonly Level[] = [
-  { name: 'whole', levers: undefined, scale: 1 },
-  { name: 'balanced', levers: balanced, scale: 1 },
+export const QUALITY_LEVELS: readonly QualityLevel[] = [
+  { name: 'whole', settings: undefined, scale: 1 },
+  { name: 'balanced', settings: balanced, scale: 1 },
   ...SCALES.map((scale) => ({
     name: `balanced at ${scale}`,
-    levers: { ...balanced, detail: SMALLER_DETAIL, resolutionScale: scale },
+    settings: { ...balanced, detail: SMALLER_DETAIL, resolutionScale: scale },
     scale,
   })),
 ];
@@ -46,7 +46,11 @@ export type Losses = ReadonlyMap<number, number>;
 export const LEAST_DECIBELS = 27;
 
 /** Those of the levels that serve an image of so many pixels, of which fewer pixels lose so much. */
-export const levelsFor = (pixels: number, levels: readonly Level[], losses?: Losses): readonly Level[] =>
+export const levelsForSize = (
+  pixels: number,
+  levels: readonly QualityLevel[],
+  losses?: Losses,
+): readonly QualityLevel[] =>
   levels.filter(
     ({ scale }) =>
       scale === 1 || (scale ** 2 * pixels >= LEAST_PIXELS && (losses?.get(scale) ?? Infinity) >= LEAST_DECIBELS),

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
-import { LADDER } from '../../packages/element/src/pace/ladder.js';
+import { QUALITY_LEVELS } from '../../packages/element/src/dynamic-quality/quality-levels.js';
 import { QUALITIES } from '@gaussian-splat/renderer';
 
 interface Line {
@@ -21,8 +21,8 @@ const SMALLEST_THAT_WINS = 0.5;
 test('there are figures', () => assert.ok(files.length > 0));
 
 test('the levels are the quality balanced, whole and of fewer pixels', () => {
-  for (const { levers, scale } of LADDER.slice(1)) {
-    const { detail, resolutionScale = 1, ...others } = levers!;
+  for (const { settings, scale } of QUALITY_LEVELS.slice(1)) {
+    const { detail, resolutionScale = 1, ...others } = settings!;
     assert.equal(resolutionScale, scale);
     assert.ok(detail! <= 1);
     for (const [name, value] of Object.entries(others))
@@ -39,11 +39,11 @@ for (const file of files) {
   };
 
   test(`${file}: each level down loses more and takes less`, () => {
-    for (let k = 1; k < LADDER.length; k++) {
-      const [above, below] = [lineOf(LADDER[k - 1].name), lineOf(LADDER[k].name)];
-      assert.ok(below.psnr < above.psnr, `dB of ${LADDER[k].name}`);
-      const wins = LADDER[k].scale >= SMALLEST_THAT_WINS ? 1 / NOISE : NOISE;
-      assert.ok(below.ratio < above.ratio * wins, `${LADDER[k].name}: ${below.ratio} after ${above.ratio}`);
+    for (let k = 1; k < QUALITY_LEVELS.length; k++) {
+      const [above, below] = [lineOf(QUALITY_LEVELS[k - 1].name), lineOf(QUALITY_LEVELS[k].name)];
+      assert.ok(below.psnr < above.psnr, `dB of ${QUALITY_LEVELS[k].name}`);
+      const wins = QUALITY_LEVELS[k].scale >= SMALLEST_THAT_WINS ? 1 / NOISE : NOISE;
+      assert.ok(below.ratio < above.ratio * wins, `${QUALITY_LEVELS[k].name}: ${below.ratio} after ${above.ratio}`);
     }
   });
 

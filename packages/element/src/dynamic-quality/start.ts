@@ -2,16 +2,16 @@
 import type { MeasuredLevels } from './time-model.js';
 
 /** Why the level is what it is: `start`, nothing is known yet; `slow`, frames took too long; `spare`, there was time to spare; `trial`, to find out what a more accurate level takes. */
-export type PaceReason = 'start' | 'slow' | 'spare' | 'trial';
+export type QualityReason = 'start' | 'slow' | 'spare' | 'trial';
 
 /** The level of frames in motion, and what is remembered for the next one. */
-export interface Pace {
+export interface QualityState {
   readonly level: number;
-  readonly reason: PaceReason;
+  readonly reason: QualityReason;
   /** Times of the last frames on this level, oldest first, ms. */
   readonly recent: readonly number[];
   /** What frames are believed to take, ms: what they usually do, which it follows up only so fast. 0 before the first frame. */
-  readonly believed: number;
+  readonly smoothedMs: number;
   /** When the last frame was known, and when the motion began that it belongs to. */
   readonly sampledAt: number;
   readonly movedAt: number;
@@ -29,11 +29,11 @@ export interface Pace {
 /** Between two changes of direction, ms: five seconds and what times may be late. */
 export const HOLD_MS = 5_200;
 
-export const INITIAL_PACE: Pace = {
+export const INITIAL_QUALITY: QualityState = {
   level: 0,
   reason: 'start',
   recent: [],
-  believed: 0,
+  smoothedMs: 0,
   sampledAt: -Infinity,
   movedAt: -Infinity,
   changedAt: -Infinity,

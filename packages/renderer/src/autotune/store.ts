@@ -27,7 +27,7 @@ export function pageStore(): AutotuneStore | null {
 }
 
 /** Returns the result of an earlier visit; undefined if there is none that this device supports. */
-export function readChoice(store: AutotuneStore | null, device: GPUDevice): Variants | undefined {
+export function readStored(store: AutotuneStore | null, device: GPUDevice): Variants | undefined {
   try {
     const { rasterizer, accumulation, threads } = JSON.parse(
       store?.getItem(keyFor(device)) ?? '{}',
@@ -42,7 +42,7 @@ export function readChoice(store: AutotuneStore | null, device: GPUDevice): Vari
   }
 }
 
-export function writeChoice(store: AutotuneStore | null, key: string, variants: Variants): void {
+export function writeStored(store: AutotuneStore | null, key: string, variants: Variants): void {
   try {
     store?.setItem(key, JSON.stringify(variants));
   } catch {
