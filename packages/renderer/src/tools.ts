@@ -49,6 +49,7 @@ export { buildPackedLevels, packWithDetail, type PackedLevels } from './levels/p
 export { packLevelRuns } from './streaming/pack-runs.js';
 export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
+export { turn } from './gpu/page-thread.js';
 export { readPacked } from './pack/packed-scene.js';
 export type { PackedHead } from './pack/pack.js';
 export { sceneBytes, type PackedPortion } from './gaussian-buffers.js';

@@ -1,7 +1,10 @@
 /** Loaded for scenes that are uploaded while their splats are put in order. */
 import { GaussianBuffers } from '@gaussian-splat/renderer';
-import { sceneBytes, type PackedHead } from '@gaussian-splat/renderer/tools';
+import { sceneBytes, turn, type PackedHead, type PackedPortion } from '@gaussian-splat/renderer/tools';
 import type { ScenePart } from '../loading/protocol.js';
+
+/** Bytes that are handed to the GPU before other tasks get the thread. */
+const BYTES_AT_ONCE = 1 << 22;
 
 export interface PartUploadOptions {
   readonly signal: AbortSignal;
@@ -16,6 +19,9 @@ export class PartUploads {
   readonly #device: Promise<GPUDevice>;
   readonly #options: PartUploadOptions;
   #gaussians: Promise<GaussianBuffers> | undefined;
+  /** Fulfils once all portions so far are written. */
+  #written: Promise<void> = Promise.resolve();
+  #left = BYTES_AT_ONCE;
 
   /** @param device fulfils once scenes may be allocated on it */
   constructor(device: Promise<GPUDevice>, options: PartUploadOptions) {
@@ -28,14 +34,18 @@ export class PartUploads {
     if ('head' in part) {
       this.destroy();
       this.#gaussians = this.#allocate(part.head);
+      this.#written = this.#gaussians.then(() => undefined);
+    } else {
+      const gaussians = this.#gaussians;
+      this.#written = this.#written.then(() => this.#write(gaussians, part.portion));
     }
-    const { portion } = part as Extract<ScenePart, { portion: unknown }>;
     // The load fails with the allocation, and says why.
-    this.#gaussians?.then((gaussians) => portion && gaussians.write(portion), ignore);
+    this.#written.catch(ignore);
   }
 
   /** The scene, once its last part has been added. Rejects as {@link GaussianBuffers.upload} does, or with the signal's reason. */
   async finish(): Promise<GaussianBuffers> {
+    await this.#written;
     const gaussians = await this.#gaussians!;
     this.#options.signal.throwIfAborted();
     return gaussians;
@@ -44,6 +54,18 @@ export class PartUploads {
   destroy(): void {
     this.#gaussians?.then((gaussians) => gaussians.destroy(), ignore);
     this.#gaussians = undefined;
+  }
+
+  /** Portions that came while the scene was allocated would otherwise be written in one task. */
+  async #write(gaussians: Promise<GaussianBuffers> | undefined, portion: PackedPortion): Promise<void> {
+    const made = await gaussians;
+    // After a restart, portions of the load before it remain.
+    if (!made || gaussians !== this.#gaussians) return;
+    made.write(portion);
+    for (const values of Object.values(portion)) if (ArrayBuffer.isView(values)) this.#left -= values.byteLength;
+    if (this.#left > 0) return;
+    await turn();
+    this.#left = BYTES_AT_ONCE;
   }
 
   async #allocate(head: PackedHead): Promise<GaussianBuffers> {
