@@ -16,26 +16,26 @@ import { openModel, readText, type ModelLocation } from './model-location.js';
 import { runModel, type RunReport, type Runtime } from './run-samples.js';
 
 export interface CheckOptions {
-  /** Path or address of a contract, which then counts before every other. */
+  /** Path or address of a contract, which overrides all others. */
   readonly contract?: string;
-  /** Run the model, too, and check its values. */
+  /** Whether to run the model, too, and check its values. */
   readonly run?: boolean;
 }
 
-/** A fault of the contract, or an error that kept the check from getting there. */
+/** A fault of the contract, or an error that prevented the check. */
 export type CheckFault = ContractFault | GaussianSplatError;
 
 export interface CheckReport {
   readonly sections: readonly ReportSection[];
   readonly faults: readonly CheckFault[];
-  /** What was inferred because there is no contract. */
+  /** Inferences for a missing contract. */
   readonly warnings: readonly string[];
 }
 
 /**
  * Checks one model against its contract.
- * @param model path or address of an ONNX file.
- * @returns tables and every fault; only programming errors are thrown.
+ * @param model Path or address of an ONNX file.
+ * @returns Tables and every fault; only programming errors are thrown.
  */
 export async function checkModel(model: string, options: CheckOptions = {}): Promise<CheckReport> {
   let location: ModelLocation | undefined;
@@ -64,7 +64,7 @@ async function checkLocation(location: ModelLocation, options: CheckOptions): Pr
   return { sections: rows.length > 0 ? [...sections, { title: 'Runs', rows }] : sections, faults, warnings };
 }
 
-/** The contract, or what is wrong with it; the file's own tables are shown in either case. */
+/** Returns the contract, or its faults; the file's own tables are shown in either case. */
 async function contractOf(
   location: ModelLocation,
   header: OnnxHeader,
@@ -89,7 +89,7 @@ async function runLocation(location: ModelLocation, header: OnnxHeader, contract
   return runModel(await loadRuntime(), { bytes: await location.bytes(), externalData }, header, contract);
 }
 
-/** Loaded only when a model is to be run: the runtime is large. */
+/** Loaded only to run a model, because the runtime is large. */
 async function loadRuntime(): Promise<Runtime> {
   const ort = await import('onnxruntime-web');
   ort.env.logLevel = 'error';

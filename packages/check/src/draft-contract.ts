@@ -1,13 +1,13 @@
 import type { Contract, InputBinding, OutputBinding } from '@gaussian-splat/core/contract';
 import type { OnnxHeader, OnnxTensor } from '@gaussian-splat/core/onnx';
 
-/** A contract that the names and shapes of a file allow, and what its author must still decide. */
+/** A contract that is consistent with the names and shapes of a file, and questions for its author. */
 export interface Draft {
   readonly contract: Contract;
   readonly questions: readonly string[];
 }
 
-/** What an attribute's output may be called, and the numbers of a row by which it is known otherwise. */
+/** Patterns for the name of an attribute's output, and the row lengths that identify it otherwise. */
 const NAMES: Readonly<Record<string, { readonly pattern: RegExp; readonly columns: readonly number[] }>> = {
   positions: { pattern: /pos|xyz|mean|cent/i, columns: [3] },
   covariances: { pattern: /cov/i, columns: [6, 9] },
@@ -18,12 +18,12 @@ const NAMES: Readonly<Record<string, { readonly pattern: RegExp; readonly column
   opacities: { pattern: /opac|alpha/i, columns: [1] },
 };
 
-/** Numbers of a row of scales, a quaternion and plain colours. */
+/** Numbers in each row of scales, a quaternion and plain colors. */
 const LGM_COLUMNS = 14;
 
 /**
- * Drafts the contract that a file lacks: each input by its name and shape, each output by its name. What no header can tell (units, activations,
- * ranges) is taken as it mostly is, and asked about.
+ * Drafts the missing contract of a file: each input by its name and shape, each output by its name. Properties that no
+ * header contains (units, activations, ranges) get common defaults, and a question.
  */
 export function draftContract(header: OnnxHeader): Draft {
   const questions: string[] = [];

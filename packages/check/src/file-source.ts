@@ -3,7 +3,7 @@ import { dirname, join } from 'node:path';
 import { isInside } from '@gaussian-splat/core/contract';
 import type { ByteSource, ExternalFile } from '@gaussian-splat/core/onnx';
 
-/** A file on disk, read in pieces. */
+/** A file on disk, read in ranges. */
 export class FileSource implements ByteSource {
   readonly name: string;
   readonly size: number;
@@ -35,7 +35,7 @@ export class FileSource implements ByteSource {
   }
 }
 
-/** Sizes of the external files that lie beside a model, by the location that the model writes. */
+/** Returns the sizes of a model's external files, by their location in the model. */
 export async function externalSizes(model: string, files: readonly ExternalFile[]): Promise<Map<string, number>> {
   const sizes = new Map<string, number>();
   for (const { location } of files) {

@@ -17,9 +17,9 @@ Checks an ONNX file (a path or an address) against the Gaussian Generator contra
 Exit status: 0 if it keeps the contract, 1 if not, 2 if the command is wrong.`;
 
 /**
- * The command. Prints tables and faults.
- * @param args without the program's own name.
- * @returns the exit status.
+ * Runs the command: prints tables and faults.
+ * @param args Without the program's own name.
+ * @returns The exit status.
  */
 export async function main(args: readonly string[]): Promise<number> {
   let parsed: ReturnType<typeof parse>;
@@ -76,7 +76,7 @@ async function draft(model: string): Promise<number> {
   }
 }
 
-/** The report as text for a terminal. */
+/** Formats the report for a terminal. */
 export function formatReport(model: string, { sections, faults, warnings }: CheckReport, isRun: boolean): string {
   const tables = sections.map(formatSection);
   const notes =
@@ -96,7 +96,7 @@ const lineOf = (fault: CheckFault): string => (fault instanceof Error ? fault.me
 function formatSection({ title, rows }: ReportSection): string {
   const widths: number[] = [];
   for (const row of rows) row.forEach((cell, i) => (widths[i] = Math.max(widths[i] ?? 0, cell.length)));
-  // A last column may be long; it needs no padding.
+  // The last column needs no padding.
   const lines = rows.map((row) =>
     row.map((cell, i) => (i < row.length - 1 ? cell.padEnd(widths[i]) : cell)).join('  '),
   );

@@ -6,12 +6,12 @@ import { sidecarName } from '@gaussian-splat/core/contract';
 import { openUrl, type ByteSource, type ExternalFile, type UrlSource } from '@gaussian-splat/core/onnx';
 import { externalSizes, FileSource } from './file-source.js';
 
-/** A model on disk or on a server, with what lies beside it. */
+/** A model on disk or on a server, with its companion files. */
 export interface ModelLocation {
   readonly source: ByteSource;
   /** Text of the contract beside the model; undefined if there is none. */
   sidecar(): Promise<string | undefined>;
-  /** Sizes of external files where they can be told without fetching them. */
+  /** Sizes of external files, if they are known without a download. */
   externalSizes(files: readonly ExternalFile[]): Promise<ReadonlyMap<string, number> | undefined>;
   /** The whole model. */
   bytes(): Promise<Uint8Array>;
@@ -20,7 +20,7 @@ export interface ModelLocation {
   close(): Promise<void>;
 }
 
-/** @param model a path, or an address that begins with http: or https:. */
+/** @param model A path, or an address that begins with http: or https:. */
 export function openModel(model: string): Promise<ModelLocation> {
   return /^https?:\/\//i.test(model) ? openRemote(model) : openLocal(model);
 }
@@ -52,7 +52,7 @@ async function openRemote(url: string): Promise<ModelLocation> {
   };
 }
 
-/** Text of a file that a person named. @throws GaussianSplatError if it cannot be read. */
+/** Returns the text of a file that the user names. @throws GaussianSplatError if it cannot be read. */
 export async function readText(path: string): Promise<string> {
   if (/^https?:\/\//i.test(path)) {
     const source = await openUrl(path);
@@ -70,7 +70,7 @@ async function readTextIfThere(path: string): Promise<string | undefined> {
   });
 }
 
-/** Many servers answer every unknown path with their own page: such an answer is no sidecar. */
+/** Many servers respond to unknown paths with their own page, which is not a sidecar. */
 async function fetchTextIfThere(url: string): Promise<string | undefined> {
   const text = await readText(url).catch((error: unknown) => {
     if (error instanceof GaussianSplatError && error.code === 'network/status') return undefined;

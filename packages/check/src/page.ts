@@ -1,4 +1,4 @@
-/** What the checker's page takes of this package: no Node in it. */
+/** Exports for the checker's page, without dependencies on Node. */
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import {
   compareParts,
@@ -13,7 +13,7 @@ import type { Outputs, SampleInputs } from './run-instances.js';
 import { runModel, type RunReport, type Runtime } from './run-samples.js';
 
 export interface PageRun extends RunReport {
-  /** How the model runs on the page's GPU, and why not there, for readers. */
+  /** Session kind on the page's GPU, and the reasons for a fallback, for display. */
   readonly how: string;
 }
 
@@ -24,12 +24,13 @@ const HOW = {
 } as const;
 
 /**
- * Runs a model as `gaussian-splat check --run` does, and each time also as pages run it, on a GPU device: the report says how the two differ.
+ * Runs a model as `gaussian-splat check --run` does, and each sample also on a GPU device as pages do: the report
+ * contains the differences.
  * @param ort ONNX Runtime for the CPU; its sessions run one after the other.
  */
 export async function runInPage(model: GeneratorModel, device: GPUDevice, ort: Runtime): Promise<PageRun> {
   const reasons: string[] = [];
-  // Compared here, sample by sample.
+  // The comparison is done here, sample by sample.
   const whole = new GeneratorSession(model, device, (reason) => reasons.push(reason), false);
   const session = model.contract.instances === undefined ? whole : whole.forInstances(1);
   try {

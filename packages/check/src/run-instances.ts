@@ -5,14 +5,14 @@ import { groupInstances, inputsOfInstances, stackInputs, type Inputs } from '@ga
 import type { Sample } from './sample-inputs.js';
 
 export type SampleInputs = Sample['inputs'];
-/** What a run wrote, by the names of outputs. */
+/** Outputs of a run by name. */
 export type Outputs = Record<string, OutputTensor>;
 type Feed = (inputs: SampleInputs) => Promise<Outputs>;
 
-/** Largest difference that another order of sums may make, as a share of the largest number of a tensor. */
+/** Tolerance for another order of summation, as a fraction of the largest number of a tensor. */
 const ROUNDING = { float32: 1e-5, float16: 2e-3 } as const;
 
-/** A run of one instance of a model that takes several, as another model's run would look. */
+/** Runs one instance of a model that takes several, in the format of any other model's run. */
 export async function runAlone(
   feed: Feed,
   header: OnnxHeader,
@@ -22,7 +22,7 @@ export async function runAlone(
   return outputsOfInstance(await feed(stacked([inputs], header, contract)), 0);
 }
 
-/** Whether instances write in one run what they write in runs of their own: no instance may know of the others. */
+/** Checks that instances write the same in one run as in separate runs, because no instance may depend on others. */
 export async function compareTogether(
   feed: Feed,
   header: OnnxHeader,
@@ -45,7 +45,7 @@ export async function compareTogether(
   return [];
 }
 
-/** Inputs of several instances as those of one run. */
+/** Stacks the inputs of several instances for one run. */
 export const stacked = (inputs: readonly SampleInputs[], header: OnnxHeader, contract: Contract): SampleInputs =>
   stackInputs(inputs as unknown as Inputs[], inputsOfInstances(header, contract)) as unknown as SampleInputs;
 
@@ -56,7 +56,7 @@ function differs(found: OutputTensor, { dtype, data }: OutputTensor): boolean {
   let largest = 0;
   for (let i = 0; i < data.length; i++) largest = Math.max(largest, Math.abs(numberAt(data, i)));
   const slack = largest * (dtype === 'float16' ? ROUNDING.float16 : ROUNDING.float32);
-  // Written so that a NaN differs from everything.
+  // The comparison is negated so that a NaN differs from everything.
   for (let i = 0; i < data.length; i++)
     if (!(Math.abs(numberAt(found.data, i) - numberAt(data, i)) <= slack)) return true;
   return false;

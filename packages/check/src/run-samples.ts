@@ -13,7 +13,7 @@ import { sampleInputs, type Sample } from './sample-inputs.js';
 
 export type Runtime = typeof OnnxRuntime;
 
-/** A model's bytes, and the files beside it. */
+/** A model's bytes, and its external files. */
 export interface ModelFiles {
   readonly bytes: Uint8Array;
   readonly externalData: readonly { readonly path: string; readonly data: Uint8Array }[];
@@ -21,20 +21,23 @@ export interface ModelFiles {
 
 export interface RunReport {
   readonly faults: readonly ContractFault[];
-  /** One row for each run: what was special, rows that live, box of the centres, milliseconds; and what {@link Compare} says. */
+  /**
+   * One row for each run: the label of its inputs, live rows, box of the centers, milliseconds; and the result of
+   * {@link Compare}.
+   */
   readonly rows: readonly (readonly string[])[];
 }
 
-/** Runs the model elsewhere with the inputs that wrote `expected` on the CPU, and says how that differs. */
+/** Runs the model on another backend with the inputs that wrote `expected` on the CPU, and describes the difference. */
 export type Compare = (
   inputs: SampleInputs,
   expected: Outputs,
 ) => Promise<{ readonly cell: string; readonly faults: readonly ContractFault[] }>;
 
 /**
- * Runs a model on the CPU with inputs that reach the ends of what its contract declares, and checks every value it writes. For shells and
- * pages alike: the figures are the same.
- * @param header of a model that keeps the contract.
+ * Runs a model on the CPU with inputs at the limits that its contract declares, and checks every value of its output.
+ * Gives the same results in Node and in browsers.
+ * @param header Header of a model that satisfies the contract.
  */
 export async function runModel(
   ort: Runtime,
@@ -70,7 +73,7 @@ export async function runModel(
 async function createSession(ort: Runtime, { bytes, externalData }: ModelFiles): Promise<InferenceSession> {
   return ort.InferenceSession.create(bytes, {
     executionProviders: ['wasm'],
-    // As the file says it: fusions have computed something else.
+    // Without fusions, because some compute wrong results.
     graphOptimizationLevel: 'basic',
     logSeverityLevel: 3,
     externalData: externalData.map(({ path, data }) => ({ path, data })),
@@ -86,7 +89,7 @@ async function runSamples(
   const faults = new Map<string, ContractFault>();
   const keep = (label: string, found: readonly ContractFault[]): void => {
     for (const fault of found) {
-      // One mistake shows in every run, mostly in other rows; the first is enough.
+      // One fault occurs in every run, mostly in other rows; the first is enough.
       const key = `${fault.code} ${fault.where.replace(/ of row \d+$/, '')}`;
       if (!faults.has(key)) faults.set(key, { ...fault, where: `${fault.where} (run with ${label})` });
     }

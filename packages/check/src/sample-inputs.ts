@@ -11,21 +11,23 @@ export interface SampleTensor {
 }
 
 export interface Sample {
-  /** What is special about it, for the table. */
+  /** Description of the sample, for the table. */
   readonly label: string;
-  /** True if controls, poses and shapes are at their defaults: declared bounds must then hold. */
+  /** Whether controls, poses and shapes have their defaults: declared bounds must then hold. */
   readonly isDefault: boolean;
   readonly inputs: Readonly<Record<string, SampleTensor>>;
 }
 
-/** Rows of Gaussians given to a link of a chain whose N is symbolic, and pixels of pictures whose size is. */
+/** Rows of the Gaussians for an input of a chain with a symbolic N, and pixels of images with symbolic sizes. */
 const SAMPLE_ROWS = 16;
 const SAMPLE_PIXELS = 64;
 
-/** Shares of the time that are tried besides its ends and its middle. */
+/** Sampled fractions of the duration, besides its ends and its middle. */
 const TIMES = [0.13, 0.25, 0.37, 0.62, 0.75, 0.89];
 
-/** Inputs, of one instance, for runs that reach the ends of what the contract declares: times and views at defaults, then controls. */
+/**
+ * Inputs of one instance for runs at the limits that the contract declares: times and views at defaults, then controls.
+ */
 export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   const given = givenTensors(header, contract);
   const one = oneInstance(header, contract);
@@ -36,7 +38,7 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
     ['last time, a third view', stateAt(contract, 4, end)],
   ];
   if (Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame')) {
-    // No simple shares of a period: of a loop they would all be one state.
+    // No simple fractions of a period, because a loop would be in the same state for all of them.
     for (const [i, share] of TIMES.entries()) {
       states.push([`${share} of the time`, stateAt(contract, 2 + i, share * end)]);
     }
@@ -51,7 +53,7 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   }));
 }
 
-/** @param controlEnd which end of their ranges controls are at; undefined for their defaults. */
+/** @param controlEnd End of the ranges of controls; undefined for their defaults. */
 function stateAt(contract: Contract, angle: number, timeSeconds: number, controlEnd?: 0 | 1): GeneratorState {
   const camera = cameraFor(contract, angle);
   if (controlEnd === undefined) return { camera, timeSeconds };
@@ -62,7 +64,7 @@ function stateAt(contract: Contract, angle: number, timeSeconds: number, control
   return { camera, timeSeconds, controls };
 }
 
-/** A view of 640x480 pixels from around the declared bounds, or around the unit box. */
+/** A view of 640x480 pixels around the declared bounds, or around the unit box. */
 function cameraFor({ bounds, coordinates }: Contract, angle: number): Camera {
   const { min, max } = bounds ?? { min: [-1, -1, -1], max: [1, 1, 1] };
   const center = min.map((low, axis) => (low + max[axis]) / 2) as unknown as Vector3;
@@ -77,7 +79,7 @@ function cameraFor({ bounds, coordinates }: Contract, angle: number): Camera {
   return { width: 640, height: 480, fx: 500, fy: 500, cx: 320, cy: 240, worldToCamera, near: 0.2, far: 1000 };
 }
 
-/** Tensors that come from elsewhere than the page: pictures, and Gaussians of another generator. */
+/** Tensors that the page does not set: images, and Gaussians of another generator. */
 function givenTensors(header: OnnxHeader, contract: Contract): Record<string, SampleTensor> {
   const tensors: Record<string, SampleTensor> = {};
   for (const input of header.inputs) {
@@ -108,7 +110,7 @@ function sampleImage(input: OnnxTensor): SampleTensor {
   );
 }
 
-/** Before the first run. */
+/** State before the first run. */
 function sampleState(input: OnnxTensor, value = 0): SampleTensor {
   const dims = fixedDims(input, 1);
   return toSample(input, dims, new Array<number>(dims.reduce((product, dim) => product * dim, 1)).fill(value));

@@ -1,4 +1,7 @@
-/** The work behind `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
+/**
+ * Implementation of `gaussian-splat stream`: reads a scene, builds its levels of detail, and writes them as pages with
+ * a manifest.
+ */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { toDegree } from '@gaussian-splat/economise';
@@ -81,14 +84,14 @@ function parseOptions(args) {
 
 const isEmpty = (folder) => readdirSync(folder).length === 0;
 
-/** True for what an earlier run left that was ended before it was done: pages of ours, and no manifest, which is written last. */
+/** Whether the folder contains an interrupted run: our pages without the manifest, which is written last. */
 function isUnfinished(folder) {
   const pages = join(folder, 'pages');
   if (readdirSync(folder).join() !== 'pages' || !statSync(pages).isDirectory()) return false;
   return readdirSync(pages).every((name) => /^(scene|top|part)-\d{5,}\.bin$/.test(name));
 }
 
-/** A device, or undefined, with a word on it, where there is none to measure with. */
+/** A device, or undefined with a message if none is available for measuring. */
 async function deviceToMeasure() {
   try {
     const { requestNodeAdapter } = await import('./lib/node-gpu.mjs');
@@ -102,7 +105,7 @@ async function deviceToMeasure() {
   }
 }
 
-/** How files are coded, and how near to the scene that is; undefined for files that are not. */
+/** Coding of the files, and its accuracy; undefined for uncompressed files. */
 async function chooseCoding({ tree, cloud, minDecibels, scored }) {
   if (minDecibels === undefined) return undefined;
   const device = await deviceToMeasure();
@@ -114,7 +117,10 @@ async function chooseCoding({ tree, cloud, minDecibels, scored }) {
   return { coding: codingOf(steps), deflate, ...found };
 }
 
-/** Pages first, then the manifest that names them: a folder without one is no scene. Where writing fails no pages stay. */
+/**
+ * Writes pages first, then their manifest: a folder without one is not a scene. If writing fails, the pages are
+ * removed.
+ */
 function writeFolder(out, tree, coded, places) {
   const pages = join(out, 'pages');
   if (existsSync(out) && isUnfinished(out)) rmSync(pages, { recursive: true });
@@ -138,7 +144,7 @@ async function main({ scene, out, degree, geometry, minDecibels, scored, columns
   const openPart = (path) => readWhole(join(dirname(scene), path));
   const read = await readScene(await readWhole(scene), { name: scene, openPart });
   sayWarnings(scene, read);
-  // Pages have no place for another up.
+  // Pages cannot store another up direction.
   const cloud = upright(toDegree(degree, read));
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });

@@ -1,4 +1,4 @@
-/** The work behind `gaussian-splat economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
+/** Implementation of `gaussian-splat compress`: reads a scene, compresses it, writes it, and reports the result. */
 import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { boundsOf, cameraFromCalibration } from '@gaussian-splat/core';
@@ -78,7 +78,7 @@ function parseOptions(args) {
   return { scene, out, minDecibels, maxBytes, views, report, scored, threads, merge, refine };
 }
 
-/** All that can be said of files before the work. */
+/** Checks all paths before the work. */
 function checkFiles({ scene, out, views, report }) {
   encodingsFor(out);
   for (const [option, path] of Object.entries({ out, report })) {
@@ -92,7 +92,7 @@ function checkFiles({ scene, out, views, report }) {
   if (report && isSameFile(report, out)) throw new UsageError('--report: expected another file than that of --out');
 }
 
-/** What stands in the way of a folder that is filled, or undefined. */
+/** Describes why a folder cannot be written, or returns undefined. */
 function obstacleInFolder(folder) {
   if (!existsSync(folder)) return obstacleTo(folder);
   if (!statSync(folder).isDirectory()) return `${folder} is no folder`;
@@ -101,7 +101,7 @@ function obstacleInFolder(folder) {
     : obstacleTo(join(folder, 'lod-meta.json'));
 }
 
-/** Writes what was found: a file, or the folder of a streamed scene, whose index comes last. */
+/** Writes the result: a file, or the folder of a streamed scene, whose index comes last. */
 function writeOut(out, bytes) {
   if (!isLodIndex(out)) return writeWhole(out, bytes);
   for (const [path, file] of filesOfZip(bytes)) {
@@ -124,10 +124,10 @@ function parseViews(path) {
   );
 }
 
-/** Longest side of a view, px: what captures are trained at. Larger pictures take gigabytes, or are beyond what a GPU draws. */
+/** Longest side of a view in px, as in training. Larger images take gigabytes, or exceed the GPU's limits. */
 const LARGEST_SIDE = 1600;
 
-/** The same view in fewer pixels, where it has too many. */
+/** Reduces the resolution of a view if it is too large. */
 function atMostLargest(camera) {
   const share = LARGEST_SIDE / Math.max(camera.width, camera.height);
   if (share >= 1) return camera;
@@ -149,7 +149,7 @@ function readViews(path) {
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
 }
 
-/** Sizes of views: the most frequent one. */
+/** The most frequent size of the views. */
 function sizeOf(views) {
   const counts = new Map();
   for (const { width, height } of views) {
@@ -182,9 +182,9 @@ async function main({
 }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
-  // What is wrong with it is said before the work.
+  // Its faults are reported before the work.
   const ownViews = readViews(viewsFile);
-  // The file and the driver take their time at the same time.
+  // Reading the file and starting the driver run in parallel.
   const pool = threads > 1 ? new ThreadPool(threads) : inline;
   const { cloud: reading } = await startReading(scene, pool);
   reading.catch(() => undefined);
@@ -193,9 +193,9 @@ async function main({
   const opened = seconds();
   const cloud = await reading;
   sayWarnings(scene, cloud);
-  // What this format has no place for is told before a picture is drawn.
+  // Unsupported properties of the format are reported before the first image is drawn.
   encodingsFor(out, cloud);
-  // What is left of it when the device is there.
+  // Remaining reading time when the device is ready.
   const read = seconds() - opened;
   const { dealt: views, range } = ownViews ?? {
     dealt: dealtViewsOfVisitors(boundsOf(cloud), scored),

@@ -1,4 +1,4 @@
-/** The work behind `gaussian-splat floor`: reads a scene, finds the floor on which a person can walk, and writes it as a map. */
+/** Implementation of `gaussian-splat floor`: reads a scene, finds its walkable floor, and writes it as a map. */
 import { readScene } from '@gaussian-splat/formats';
 import {
   encodeWalkMap,
@@ -24,9 +24,9 @@ const USAGE = `usage: gaussian-splat floor SCENE|VOXELS.voxel.json --out FILE.fl
 `;
 
 const METERS = { m: 1, cm: 0.01, mm: 0.001 };
-/** Free height above the eyes that a body needs, meters: that of the element. */
+/** Free height above the eyes of a body, meters, same as in the element. */
 const ABOVE_EYES = 0.1;
-/** Rows of the rotations to a frame with y up; those of the element's attribute `up`. */
+/** Rows of the rotations to coordinates with y up, for the values of the element's attribute `up`. */
 const FRAMES = {
   x: [
     [0, -1, 0],
@@ -88,13 +88,13 @@ function parseOptions(args) {
   };
 }
 
-/** Name of the axis that a file's own direction is nearest to. */
+/** Name of the axis nearest to a file's own up direction. */
 function axisOf([x, y, z]) {
   const axes = { x, '-x': -x, y, '-y': -y, z, '-z': -z };
   return Object.entries(axes).reduce((best, axis) => (axis[1] > best[1] ? axis : best))[0];
 }
 
-/** From the voxels that splat-transform has made of a scene. */
+/** Finds the floor from splat-transform's voxels of a scene. */
 async function floorOfVoxels(scene, up, options) {
   const files = { head: await readWhole(scene), tree: await readWhole(voxelTreePath(scene)), name: basename(scene) };
   const { grid, solid } = readVoxels(files, FRAMES[up ?? '-y'], options.metersPerUnit);

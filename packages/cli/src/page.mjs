@@ -1,7 +1,8 @@
 /**
- * `gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]`: a page with a scene of one's own. Puts the element and the scene into
- * FOLDER, writes an index.html unless there is one, and serves the folder. What then lies there is static: any host can have it. With `--single`
- * the index.html is all: the element and the scene are in it, and it can be opened from a disk or sent by mail.
+ * `gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]`: a page with your own scene. Copies the
+ * element and the scene to FOLDER, writes an index.html unless there is one, and serves the folder. The result is
+ * static, so any host can serve it. With `--single` the index.html contains the element and the scene, and can be
+ * opened from a disk or sent by mail.
  */
 import { cpSync, existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
@@ -13,7 +14,7 @@ import { serve } from './lib/server.mjs';
 const USAGE = 'gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]';
 const elementFile = (path) => fileURLToPath(new URL(path, import.meta.resolve('@gaussian-splat/element/package.json')));
 const CDN = elementFile('cdn');
-/** The element in one module, with all that it fetches later. */
+/** The element in one module, including its late-loaded chunks. */
 const ELEMENT = new URL('../dist/single.js', import.meta.url);
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
@@ -34,7 +35,10 @@ async function writeFolder() {
   else writeFileSync(page, htmlOf(SCRIPT, tag, titleOf(basename(scene))));
 }
 
-/** The element and the scene as text in the page. The scene becomes a file again, with its name, since that tells some formats. */
+/**
+ * Embeds the element and the scene as text in the page. The scene becomes a file with its name again, because the name
+ * identifies some formats.
+ */
 async function writeSingle() {
   if (existsSync(page)) stop(`${page} is there already. With --single name a folder without one.`);
   const { found, missing } = await filesBeside(scene);
@@ -70,7 +74,7 @@ function parseOptions() {
     process.exit(0);
   }
   if (positionals.length !== 2) stop(`A scene and a folder are needed: ${USAGE}`);
-  // npm runs scripts in the repository's root, wherever it was called.
+  // npm runs scripts in the repository's root, independent of the current folder.
   const [scene, folder] = positionals.map((path) => resolve(process.env.INIT_CWD ?? '.', path));
   if (!existsSync(scene)) stop(`There is no file ${scene}. ${USAGE}`);
   if (!statSync(scene).isFile()) stop(`${scene} is a folder: name the scene's file in it. ${USAGE}`);
@@ -86,7 +90,7 @@ function stop(message) {
   process.exit(1);
 }
 
-/** ONNX Runtime has 43 MB and is for generators alone; maps are for those who work on the element. */
+/** ONNX Runtime has 43 MB and is needed only for generators; source maps are for developers of the element. */
 function copyElement(target) {
   const isNeeded = (path) => {
     const inside = relative(CDN, path);
@@ -96,8 +100,8 @@ function copyElement(target) {
 }
 
 /**
- * Where the scene then lies, seen from the page, with the files that it names and no others. One that a JSON describes keeps its folder's name, for its files are called alike in
- * every scene.
+ * Copies the scene with only the files that it names, and returns its path from the page. A scene described by a JSON
+ * keeps its folder's name, because its files have the same names in every scene.
  */
 async function copyScene() {
   const [name, from] = [basename(scene), dirname(scene)];
@@ -105,7 +109,7 @@ async function copyScene() {
   if (missing.length > 0) console.warn(`${name} names files that were not copied: ${missing.join(', ')}`);
   const own = isJson(scene) && from !== folder ? basename(from) : '';
   const to = join(folder, own);
-  // Links would lead out of the folder.
+  // Dereferenced, because links would lead out of the folder.
   if (from !== to) for (const file of [name, ...found]) cpSync(join(from, file), join(to, file), { dereference: true });
   return own === '' ? name : `${own}/${name}`;
 }

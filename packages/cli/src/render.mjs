@@ -1,4 +1,4 @@
-/** The work behind `gaussian-splat render`: one scene, one camera, one image, on the same renderer that the element uses. */
+/** Implementation of `gaussian-splat render`: one scene, one camera, one image, with the renderer of the element. */
 import { basename, dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { cameraFromCalibration, SPLAT_FILTERS } from '@gaussian-splat/core';
@@ -81,7 +81,7 @@ function readCamera(path, name) {
   return cameraFromCalibration(view, `${basename(path)}: view ${name}`);
 }
 
-/** Scenes of several files have the others beside the one that is named. */
+/** Other files of a scene are in the folder of the named one. */
 async function readSceneFile(name) {
   const path = resolve(from, name);
   const openPart = (part) => readWhole(join(dirname(path), part));
@@ -105,7 +105,7 @@ function chooseAccumulation(asked, device) {
   return device.features.has('float32-blendable') ? 'rgba32float' : 'rgba16float';
 }
 
-/** All that can be said of files before the work. */
+/** Checks all paths before the work. */
 function checkFiles({ scene, camera, out, float }) {
   for (const [option, path] of Object.entries({ out, float })) {
     if (!path) continue;

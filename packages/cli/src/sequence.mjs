@@ -1,4 +1,7 @@
-/** The work behind `gaussian-splat sequence`: a sequence of scene files whose splats correspond becomes a scene and what moves in it. */
+/**
+ * Implementation of `gaussian-splat sequence`: converts a sequence of scene files with corresponding splats to a scene
+ * and its motion.
+ */
 import { existsSync, mkdirSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';

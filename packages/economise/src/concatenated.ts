@@ -1,4 +1,4 @@
-/** Pieces of bytes, one after the other. */
+/** Concatenates byte arrays. */
 export function concatenated(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
   const all = new Uint8Array(pieces.reduce((sum, { length }) => sum + length, 0));
   let at = 0;

@@ -10,75 +10,85 @@ import { cutCloud, searchRefined, type CutCloud, type Plan } from './refine/sear
 import { encodingsFor, type Encoding } from './write/index.js';
 import type { EncodeWebp } from './write/sog.js';
 
-/** Where the time goes. */
+/** Measures the time by kind of work. */
 export class Stopwatch {
   readonly #seconds: Record<string, number> = {};
   #last = performance.now();
 
-  /** Adds what has passed since the last lap to a kind of work. */
+  /** Adds the time since the last lap to a kind of work. */
   lap(work: string): void {
     const now = performance.now();
     this.#seconds[work] = (this.#seconds[work] ?? 0) + (now - this.#last) / 1000;
     this.#last = now;
   }
 
-  /** By the kind of work, s. */
+  /** Seconds by kind of work. */
   get seconds(): Readonly<Record<string, number>> {
     return { ...this.#seconds };
   }
 }
 
 export interface EconomiseOptions {
-  /** PSNR over the covered pixels of the held-out views that the written file must reach, dB. */
+  /** Minimum PSNR over the covered pixels of the held-out views for the written file, dB. */
   readonly minDecibels: number;
-  /** Name of the file to be written; its extension tells the format. */
+  /** Name of the output file, whose extension selects the format. */
   readonly name: string;
-  /** Looks at the cloud: `GpuEvaluator`, or one around it. */
+  /** Evaluates the cloud: a `GpuEvaluator`, or a wrapper of one. */
   readonly evaluator: Evaluator;
-  /** Does what comes in parts, of writing and reading the file again; default {@link inline}. */
+  /** Runs parallel parts of writing and reading back the file; default {@link inline}. */
   readonly pool?: TaskPool;
-  /** Encodes lossless WebP, of which SOG is made: for `.sog` alone. */
+  /** Encodes lossless WebP for SOG: needed only for `.sog`. */
   readonly encodeWebp?: EncodeWebp;
   readonly signal?: AbortSignal;
-  /** Called with what is being done. */
+  /** Called with a description of each step. */
   readonly onStep?: (step: string) => void;
 }
 
-/** A scene made smaller, and what that cost. */
+/** A compressed scene, and its quality. */
 export interface Economised {
   readonly bytes: Uint8Array<ArrayBuffer>;
   readonly encoding: string;
   readonly splats: { readonly before: number; readonly after: number };
-  /** Coefficients of spherical harmonics above the constant one, all splats and channels. */
+  /** Coefficients of spherical harmonics above the constant one, over all splats and channels. */
   readonly coefficients: { readonly before: number; readonly after: number };
-  /** Splats of degree 0, 1, 2 and 3. */
+  /** Number of splats of degree 0, 1, 2 and 3. */
   readonly degrees: readonly number[];
-  /** dB over the covered pixels: of all held-out views together, and of the worst of them. */
+  /** dB over the covered pixels: of all held-out views together, and of the worst one. */
   readonly decibels: number;
   readonly worstDecibels: number;
-  /** How many held-out views these are: those that show some of the scene. */
+  /** Number of held-out views that show some of the scene. */
   readonly heldOutViews: number;
   readonly cut: Cut;
-  /** How long each kind of work took, s: `score`, `search`, `refine`, `fit`, `write` (and read again), `judge`; with several encodings `encode`. */
+  /**
+   * Duration of each kind of work, s: `score`, `search`, `refine`, `fit`, `write` (and read back), `judge`; with
+   * several encodings `encode`.
+   */
   readonly seconds: Readonly<Record<string, number>>;
 }
 
-/** Share of the error that goes to rounding at most, before a finer encoding is tried. */
+/** Maximum fraction of the error for quantization before a finer encoding is tried. */
 const ROUNDING_SHARE = 0.6;
-/** How much less is taken where the written file misses the figure; the next time as much less again than that. The last try keeps everything. */
+/**
+ * Factor of the cut if the written file misses the target, squared in the next try and so on. The last try keeps
+ * everything.
+ */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
-/** How often more is taken, of which part of what is left, and from which part of the allowed error on that is not worth another try. */
+/**
+ * Maximum number of enlargements of the cut, the fraction of the remaining error that each uses, and the fraction of
+ * the allowed error that ends them.
+ */
 const [MOST_MORE, MORE_SHARE, ENOUGH] = [3, 0.9, 0.98];
 const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
- * Makes a scene smaller without going below a figure: scores all splats by what the views would lack without them, drops the least missed,
- * takes view-dependent colour from splats where it does not show, orders the rest from coarse to fine, and writes it. How much of the error goes to
- * which of the two is what saves most. The figure is measured on the written file, read again, in held-out
- * views: they scored and chose nothing, and could only ask for a smaller cut.
+ * Compresses a scene to a target PSNR: scores all splats by the error of the views without them, drops the least
+ * important, removes view-dependent color that is not visible, sorts the rest from coarse to fine, and writes it. The
+ * error is divided between both cuts to save the most. The PSNR is measured on the written file after reading it back,
+ * in held-out views: these do not influence scores or choices, and can only make the cut smaller.
  *
- * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, the file's name is of no known format, or views show nothing of the scene.
+ * @throws GaussianSplatError `argument/value` if the format cannot reach the target, the extension of the file's name
+ * is unknown, or no view shows the scene.
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
   const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
@@ -142,24 +152,26 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   };
 }
 
-/** A written scene in the frame of the one that it was made of: formats without a place for up have it turned. */
+/**
+ * Converts a written scene to the coordinates of its source, because formats without an up direction store it rotated.
+ */
 function asGiven(written: GaussianCloud, cloud: GaussianCloud): GaussianCloud {
   const rotation = written.hints?.up === undefined ? uprightRotation(cloud) : undefined;
   return rotation ? turned(written, transposed(rotation)) : written;
 }
 
-/** A file, read again and judged. */
+/** A file, read back and evaluated. */
 interface Written extends CutCloud {
   readonly encoding: Encoding;
   readonly bytes: Uint8Array;
-  /** Of each held-out view, and of all together. */
+  /** Errors of each held-out view, and of all together. */
   readonly errors: readonly number[];
   readonly error: number;
 }
 
 /**
- * Takes what a file leaves of the error that is allowed: its rounding was measured in other views, and cuts come in jumps.
- * @param take writes a file whose error is larger by about `extra`
+ * Uses the remaining error of a file, because its quantization was measured in other views, and cuts are discrete.
+ * @param take Writes a file with an error that is larger by about `extra`.
  */
 async function takeMore(found: Written, target: number, take: (extra: number) => Promise<Written>): Promise<Written> {
   let [best, low, high] = [found, 0, Infinity];
@@ -172,7 +184,10 @@ async function takeMore(found: Written, target: number, take: (extra: number) =>
   return best;
 }
 
-/** The smallest way to write the scene whose rounding leaves room for more. Where there is but one, the written file alone is judged. */
+/**
+ * Selects the smallest encoding whose quantization error leaves room for cuts. If there is only one, only the written
+ * file is evaluated.
+ */
 async function chooseEncoding(
   cloud: GaussianCloud,
   encodings: readonly Encoding[],
@@ -204,7 +219,7 @@ async function chooseEncoding(
   throw unreachable(options, atMost(best));
 }
 
-/** The same bytes in memory that is nobody else's: much that takes bytes refuses shared ones. */
+/** Copies shared memory, because many APIs reject shared buffers. */
 function unshared(bytes: Uint8Array): Uint8Array<ArrayBuffer> {
   return bytes.buffer instanceof ArrayBuffer ? (bytes as Uint8Array<ArrayBuffer>) : new Uint8Array(bytes);
 }

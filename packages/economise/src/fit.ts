@@ -7,41 +7,44 @@ import type { Cut } from './reduce.js';
 import type { Ranking } from './score.js';
 import { bestTrades, measureTrades, type TradeCurve } from './search.js';
 
-/** Shares of the splats whose absence is measured, the least missed first. */
+/** Fractions of splats whose removal is measured, least important first. */
 const DROPPED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-/** The share at which two scores are held against one another. */
+/** Two scores are compared at this fraction. */
 const TRIAL_SHARE = 0.06;
-/** Prices of a coefficient that are measured. */
+/** Measured prices of a coefficient. */
 const PRICES = Array.from({ length: 14 }, (_, k) => 10 ** (-14.5 + 0.5 * k));
-/** Numbers that a splat has besides its harmonics. */
+/** Numbers of a splat besides its harmonics. */
 const OTHER_NUMBERS = 11;
-/** Cuts that are tried in the held-out views, and how near to the figure one must come. */
+/** Number of cuts to try in the held-out views, and the fraction of the allowed error that ends the search. */
 const FIT_TRIES = 6;
 const NEAR_ENOUGH = 0.99;
 
-/** What can be traded for error. */
+/** Cuts that trade size for error. */
 export interface Trades {
-  /** The cut that saves most numbers of the file, by what was measured, within a mean squared error. */
+  /** Returns the cut that saves the most numbers of the file within a mean squared error, from measurements. */
   readonly cutAt: (error: number) => Cut;
 }
 
-/** How a search is watched and ended, and what it may count on. */
+/** Options of the search. */
 export interface FitOptions {
-  /** Part of the error of drops and merges that refining leaves; 1, the default, where nothing is refined. What fewer bands cost stays as it is. */
+  /**
+   * Fraction of the error of drops and merges that remains after refinement; 1, the default, without refinement. The
+   * error of fewer bands does not change.
+   */
   readonly leftByRefining?: number;
-  /** True if every splat of the file takes as many coefficients as the one with the most: see `Encoding`. */
+  /** Whether every splat of the file takes as many coefficients as the one with the most: see `Encoding`. */
   readonly hasOneDegree?: boolean;
   readonly signal?: AbortSignal;
   readonly onStep?: (step: string) => void;
 }
 
-/** What a score stands for. */
+/** A candidate score for dropping, with thresholds. */
 interface Dropping {
   readonly thresholds: readonly number[];
   readonly cutAt: (threshold: number) => Cut;
 }
 
-/** Measures, in the searched views, what dropping alone costs, and what fewer bands of colour alone. */
+/** Measures, in the search views, the separate costs of dropping splats and of dropping bands of color. */
 export async function findTrades(
   cloud: GaussianCloud,
   ranking: Ranking,
@@ -94,13 +97,16 @@ export async function findTrades(
   return tradeMerges(trades, merge, budget, measure);
 }
 
-/** Numbers of a file with so many splats of each degree. @param hasOneDegree if all take as many as those of the highest */
+/**
+ * Number of coefficients in a file, from the count of splats of each degree. @param hasOneDegree Whether all take as
+ * many as those of the highest.
+ */
 export function numbersOf(degrees: readonly number[], hasOneDegree = false): number {
   if (hasOneDegree) return numbersOf(atHighest(degrees));
   return degrees.reduce((sum, splats, degree) => sum + splats * (OTHER_NUMBERS + 3 * (degree + 1) ** 2), 0);
 }
 
-/** As many splats, all of the highest degree that one has. */
+/** The same number of splats, all of the highest degree that occurs. */
 function atHighest(degrees: readonly number[]): number[] {
   const count = degrees.reduce((sum, splats) => sum + splats, 0);
   const highest = degrees.findLastIndex((splats) => splats > 0);
@@ -108,8 +114,9 @@ function atHighest(degrees: readonly number[]): number[] {
 }
 
 /**
- * Thresholds for dropping, in the score that does better at the trial share: what single views would lack, or the largest weight in a pixel. The former
- * knows what lies behind a splat and how large it is, the latter is the more careful with what goes together; which counts for more depends on the scene.
+ * Selects thresholds of the better score at the trial fraction: the error of single views, or the largest weight in a
+ * pixel. The former accounts for the size of a splat and the splats behind it, the latter is more careful with splats
+ * that are removed together; the better one depends on the scene.
  */
 async function chooseDropping(
   { removalError, contribution }: Ranking,
@@ -122,7 +129,7 @@ async function chooseDropping(
   ].map(({ values, cutAt }) => {
     const places = [TRIAL_SHARE, ...DROPPED_SHARES].map((share) => Math.floor(share * (values.length - 1)));
     const [trial, ...dropped] = valuesAtPlaces(values, places);
-    // What costs nothing at all goes first, however little more may go.
+    // Splats without any cost are dropped first, for any budget.
     return { trial, dropped: [leastAboveZero(values), ...dropped], cutAt };
   });
   const trials: number[] = [];
@@ -133,7 +140,7 @@ async function chooseDropping(
   return { thresholds, cutAt };
 }
 
-/** GPUs may take smaller numbers for 0. */
+/** GPUs may flush smaller numbers to 0. */
 const LEAST_NORMAL = 2 ** -126;
 
 function leastAboveZero(values: Float32Array): number {
@@ -143,8 +150,9 @@ function leastAboveZero(values: Float32Array): number {
 }
 
 /**
- * How much of what the search allows can be taken so that the held-out views, too, stay within the error: they may ask for less, never allow more.
- * @returns a share in 0..1; 0 if nothing can be
+ * Finds the fraction of the search's budget that keeps the held-out views within the error, too: they can only reduce
+ * it.
+ * @returns A fraction in 0..1; 0 if there is none.
  */
 export async function scaleToFit(
   { cutAt }: Trades,
@@ -160,7 +168,8 @@ export async function scaleToFit(
     if (error <= budget) fits = next;
     else fails = next;
     if (fits === 1 || (error <= budget && error > NEAR_ENOUGH * budget)) break;
-    // Errors grow nearly as what is allowed does, but in steps where there are few splats: what has gone no farther down is no guide.
+    // Errors are nearly proportional to the budget, but in steps if there are few splats: an error that did not
+    // decrease is no basis for extrapolation.
     const guess = (next * 0.995 * budget) / error;
     next = guess > fits && guess < fails && error !== last ? guess : (fits + Math.min(1, fails)) / 2;
     last = error;

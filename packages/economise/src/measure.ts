@@ -4,7 +4,9 @@ import type { JudgedViews } from './evaluator.js';
 /** An image, [height, width, 4] premultiplied red, green, blue and alpha in float32. */
 export type Image = Float32Array;
 
-/** Mean squared difference of the three colours, peak 1, over the pixels that the reference covers; 0 where it covers none. */
+/**
+ * Mean squared difference of the three colors, peak 1, over the pixels that the reference covers; 0 if there are none.
+ */
 export function meanSquare(image: Image, reference: Image): number {
   let sum = 0;
   let pixels = 0;
@@ -23,8 +25,8 @@ export const mean = (values: readonly number[]): number =>
 
 /**
  * The error of some views together.
- * @param errors of those that show anything
- * @throws GaussianSplatError `argument/value` if none does: nothing could be told of a cut
+ * @param errors Errors of the views that show the scene.
+ * @throws GaussianSplatError `argument/value` if there are none, because a cut could not be evaluated.
  */
 export function errorTogether(errors: readonly number[], views: JudgedViews): number {
   if (errors.length > 0) return mean(errors);

@@ -2,8 +2,9 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { sortByKey } from '@gaussian-splat/renderer/tools';
 
 /**
- * Places of numbers from the least to the largest, of equal ones the last first: backwards it is from the largest, in their order. Numbers must not be negative: then they are in the order of their bits, and millions are
- * sorted digit by digit ten times faster than by comparison.
+ * Indices in ascending order of numbers, of equal ones the last first: reversed it is a stable descending order.
+ * Numbers must not be negative: their bits then sort in the same order, and a radix sort of millions is ten times as
+ * fast as comparisons.
  */
 export function ascendingOrder(values: Float32Array): Uint32Array {
   const bits = new Uint32Array(values.buffer, values.byteOffset, values.length);
@@ -12,12 +13,13 @@ export function ascendingOrder(values: Float32Array): Uint32Array {
   return sortByKey(places, bits.slice().reverse());
 }
 
-/** Numbers of half a word. */
+/** Number of values of half a word. */
 const HALVES = 1 << 16;
 
 /**
- * The numbers that would stand at some places if all were in ascending order, which takes a tenth of the time of putting them there. Numbers must not be negative. They are counted by the upper
- * halves of their bits, and those whose upper halves matter by the lower ones.
+ * Order statistics: the numbers at some positions of the ascending order, in a tenth of the time of sorting. Numbers
+ * must not be negative. A histogram of the upper halves of their bits selects candidates, a second one their lower
+ * halves.
  */
 export function valuesAtPlaces(values: Float32Array, places: readonly number[]): number[] {
   const bits = new Uint32Array(values.buffer, values.byteOffset, values.length);
@@ -43,14 +45,14 @@ export function valuesAtPlaces(values: Float32Array, places: readonly number[]):
   return [...new Float32Array(words.buffer)];
 }
 
-/** Which of the counted ones stands at a place, and at which place among those like it. */
+/** Finds the bin of a histogram at a position of the order, and the position within it. */
 function countedAt(counts: Uint32Array, place: number): { half: number; rest: number } {
   let [half, rest] = [0, place];
   while (rest >= counts[half]) rest -= counts[half++];
   return { half, rest };
 }
 
-/** The same splats, the most seen first: by contribution times the area of the splat. */
+/** Sorts the splats by visibility, most visible first: contribution times the area of the splat. */
 export function coarseToFine(
   { scales }: Pick<GaussianCloud, 'scales'>,
   contribution: Float32Array,
@@ -69,7 +71,7 @@ export function coarseToFine(
   return order;
 }
 
-/** What {@link coarseToFine} makes of all splats of a cloud: a thread can do it before it is known which of them stay. */
+/** {@link coarseToFine} for all splats of a cloud, which a thread can run before the cut is known. */
 export function orderAll({ scales, contribution }: { scales: Float32Array; contribution: Float32Array }): Uint32Array {
   return coarseToFine(
     { scales },
@@ -78,7 +80,7 @@ export function orderAll({ scales, contribution }: { scales: Float32Array; contr
   );
 }
 
-/** Those of an order of all splats that stay. */
+/** Filters an order of all splats to the remaining ones. */
 export function stayingInOrder(order: Uint32Array, staying: Uint32Array): Uint32Array {
   const stays = new Uint8Array(order.length);
   for (let k = 0; k < staying.length; k++) stays[staying[k]] = 1;

@@ -1,4 +1,4 @@
-/** Work that comes in parts, for threads that do them: this entry loads no renderer. */
+/** Parallel tasks for threads: this entry point loads no renderer. */
 export { gatherParts } from './parts/read-in-parts.js';
 export { readBlocks, type PartRead } from './parts/read-part.js';
 export type { Part } from './parts/cloud-memory.js';

@@ -6,39 +6,46 @@ import { inline, partsOf, poolFor, type TaskPool } from './parts/task-pool.js';
 import type { Scores } from './score.js';
 import { takeSplats } from './take-splats.js';
 
-/** What is taken from a scene. */
+/** Thresholds for reducing a scene. */
 export interface Cut {
-  /** Splats that contribute less than this to every pixel go; 0, the default, keeps all. */
+  /** Drops splats that contribute less than this to every pixel; 0, the default, keeps all. */
   readonly minContribution?: number;
-  /** Splats whose absence costs less than this mean squared error go; 0, the default, keeps all. */
+  /** Drops splats whose removal costs less than this mean squared error; 0, the default, keeps all. */
   readonly removalPrice?: number;
-  /** Mean squared error that a splat's coefficient is worth: those that save less go; 0, the default, keeps all. */
+  /** Mean squared error that a coefficient is worth: those that save less are dropped; 0, the default, keeps all. */
   readonly colourPrice?: number;
-  /** Pairs of splats that look like one at a mean squared error up to this become one, by evaluators that merge ({@link MergingEvaluator}); 0, the default, merges none. */
+  /**
+   * Merges pairs of similar splats up to this mean squared error, if the evaluator supports it ({@link
+   * MergingEvaluator}); 0, the default, merges none.
+   */
   readonly mergePrice?: number;
 }
 
-/** A cloud with its least needed parts gone. */
+/** A cloud without its least important parts. */
 export interface ReducedCloud {
-  /** From the most to the least seen, so that any beginning of it is a coarser image of all; of planes in the source's order. Coefficients above a splat's degree are 0. */
+  /**
+   * Sorted by visibility, so that any prefix is a coarser image of the whole; scenes of planes keep the source's order.
+   * Coefficients above a splat's degree are 0.
+   */
   readonly cloud: GaussianCloud;
   /** [N] degree that each splat keeps. */
   readonly degrees: Uint8Array;
-  /** [N] its number in the source; of a merged splat that of one that it was made of. */
+  /** [N] index in the source; for a merged splat that of one of its sources. */
   readonly kept: Uint32Array;
 }
 
-/** Which splats stay, and how much of their colours. */
+/** The remaining splats, and their color bands. */
 export interface Choice {
-  /** Numbers of the splats that stay, the most seen first. */
+  /** Indices of the remaining splats, most visible first. */
   readonly kept: Uint32Array;
   /** [N] degree that each of them keeps. */
   readonly degrees: Uint8Array;
 }
 
 /**
- * The order in which splats of a cloud are written: the most seen first. Those of planes stay in the file's order, in which splats at equal depths are painted.
- * @param splats numbers of those that stay, ascending
+ * Order for writing the splats of a cloud: most visible first. Scenes of planes keep the order of the file, which
+ * decides between splats of equal depth.
+ * @param splats Indices of the remaining ones, ascending.
  */
 export function writtenOrder(
   cloud: Pick<GaussianCloud, 'scales' | 'positions'>,
@@ -48,7 +55,7 @@ export function writtenOrder(
   return isOfPlanes(cloud.positions) ? splats.slice() : coarseToFine(cloud, contribution, splats);
 }
 
-/** Applies a cut. The source is left as it is. */
+/** Applies a cut. The source is not modified. */
 export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedCloud {
   const { contribution, removalError, lowered } = scores;
   const { minContribution = 0, removalPrice = 0, colourPrice = 0 } = cut;
@@ -68,19 +75,22 @@ export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedC
   return reduced;
 }
 
-/** The splats that stay, in their order. Coefficients of those that keep a lower degree than the cloud's are 0: to be put in by whoever knows them. */
+/**
+ * Returns the remaining splats in order. Coefficients of splats with a reduced degree are 0, to be filled in by the
+ * caller.
+ */
 export function reduceTo(cloud: GaussianCloud, choice: Choice): ReducedCloud {
   const reduced = roomFor(cloud, choice, inline);
   takeSplats({ from: cloud, to: reduced.cloud, ...choice, at: 0 });
   return reduced;
 }
 
-/** Some splats of a cloud, in an order. */
+/** Returns some splats of a cloud in the given order. */
 export function splatsOf(cloud: GaussianCloud, numbers: Uint32Array): GaussianCloud {
   return reduceTo(cloud, { kept: numbers, degrees: new Uint8Array(numbers.length).fill(cloud.shDegree) }).cloud;
 }
 
-/** The cloud without its harmonics above a degree. */
+/** Returns the cloud without harmonics above a degree. */
 export function toDegree(degree: ShDegree, cloud: GaussianCloud): GaussianCloud {
   if (cloud.shDegree <= degree) return cloud;
   const [all, kept] = [3 * shCoefficientCount(cloud.shDegree), 3 * shCoefficientCount(degree)];
@@ -89,7 +99,7 @@ export function toDegree(degree: ShDegree, cloud: GaussianCloud): GaussianCloud 
   return { ...cloud, shDegree: degree, sh };
 }
 
-/** The same, in parts. What is left lies in memory that the pool's tasks share. */
+/** The same in parallel. The result is in memory that the pool's tasks share. */
 export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: TaskPool): Promise<ReducedCloud> {
   const reduced = roomFor(cloud, choice, pool);
   const [from, to] = [columnsOf(cloud), columnsOf(reduced.cloud)];
@@ -101,14 +111,14 @@ export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: 
   return reduced;
 }
 
-/** A reduced cloud whose numbers are all 0. */
+/** Allocates a reduced cloud of zeros. */
 function roomFor(cloud: GaussianCloud, { kept, degrees }: Choice, pool: TaskPool): ReducedCloud {
   const highest = degreesOf(degrees).findLastIndex((count) => count > 0);
   const columns = allocateColumns(kept.length, Math.max(0, highest) as ShDegree, pool);
   return { cloud: { ...cloud, ...columns, count: kept.length }, degrees, kept };
 }
 
-/** The degree at which error and the price of what is kept add up to least. */
+/** The degree that minimizes the error plus the price of the kept coefficients. */
 function degreeOf(full: ShDegree, { lowered }: Scores, i: number, price: number): ShDegree {
   let best = full;
   let least = price * shCoefficientCount(full);
@@ -120,14 +130,14 @@ function degreeOf(full: ShDegree, { lowered }: Scores, i: number, price: number)
   return price > 0 ? best : full;
 }
 
-/** [4] splats of each degree. */
+/** [4] number of splats of each degree. */
 export function degreesOf(degrees: Uint8Array): number[] {
   const counts = [0, 0, 0, 0];
   for (const degree of degrees) counts[degree]++;
   return counts;
 }
 
-/** Coefficients above the constant one that a reduced cloud keeps, all splats and channels together. */
+/** Number of coefficients above the constant one in a reduced cloud, over all splats and channels. */
 export function keptCoefficients(degrees: Uint8Array): number {
   return degreesOf(degrees).reduce((sum, count, degree) => sum + 3 * count * ((degree + 1) ** 2 - 1), 0);
 }

@@ -1,33 +1,42 @@
-/** What the splats of a cloud were seen to contribute. */
+/** Contribution of the splats of a cloud in the views. */
 export interface Ranking {
-  /** [N] largest weight in any pixel of any view, 0..1; 1 for splats that too few views see to judge them. */
+  /** [N] largest weight in any pixel of any view, 0..1; 1 for splats that too few views contain. */
   readonly contribution: Float32Array;
-  /** [N] the largest mean squared error of any view's image if this splat alone goes, peak 1; Infinity for splats that too few views see. */
+  /**
+   * [N] the largest mean squared error of any view's image from removing only this splat, peak 1; Infinity for splats
+   * that too few views contain.
+   */
   readonly removalError: Float32Array;
 }
 
-/** The colours of all splats with fewer bands. */
+/** Colors of all splats at a lower degree. */
 export interface LoweredColours {
-  /** [N] the mean squared error of the views' images if this splat alone has them; Infinity for splats that too few views see. */
+  /**
+   * [N] mean squared error of the views' images from this change of a single splat; Infinity for splats that too few
+   * views contain.
+   */
   readonly error: Float32Array;
-  /** [(degree + 1)², 3] coefficients of splat i: those that come nearest to the colours that the views saw. */
+  /** [(degree + 1)², 3] coefficients of splat i: the least-squares fit to the colors in the views. */
   of(i: number): Float32Array;
 }
 
-/** A ranking, and what splats look like with fewer bands of colour. */
+/** A ranking, and the colors with fewer bands. */
 export interface Scores extends Ranking {
-  /** The colours at each degree below the cloud's. */
+  /** The colors at each degree below the cloud's. */
   readonly lowered: readonly LoweredColours[];
 }
 
-/** A splat that fewer views looked at is kept, with all bands of its colour: another view may show it in full. */
+/**
+ * Minimum number of views that must contain a splat; otherwise it is kept with all color bands, because another view
+ * may show it in full.
+ */
 export const MIN_LOOKS = 3;
 
 /**
- * What lies behind a splat differs from it by the root of this, in other views, besides what it does in those that were looked at: much of what goes
- * goes together with what lay behind it, and then something else is seen.
+ * Assumed squared contrast between a splat and its background in other views, in addition to that in the scoring views:
+ * splats are often removed together with those behind them, which reveals other colors.
  */
 export const UNSEEN_CONTRAST = 0.1;
 
-/** A few views know little of a colour that depends on the view: so many more are imagined, from everywhere. */
+/** Number of imagined views from all directions, because a few views constrain a view-dependent color weakly. */
 export const PRIOR_VIEWS = 4;

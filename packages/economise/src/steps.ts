@@ -1,25 +1,26 @@
-/** Step sizes of what is rounded. */
+/** Quantization step sizes. */
 export type Steps<K extends string> = Readonly<Record<K, number>>;
 
 export interface AllocateOptions<K extends string> {
-  /** Steps to begin with: errors of all of them can be distinguished. */
+  /** Initial steps: large enough that the errors of all are distinguishable. */
   readonly usual: Steps<K>;
-  /** Numbers of a splat that each step is that of. */
+  /** Numbers of a splat for each step. */
   readonly numbers: Partial<Steps<K>>;
   /** Mean squared error with some steps. */
   readonly measure: (steps: Steps<K>) => Promise<number>;
-  /** Mean squared error that all of them may make together. */
+  /** Allowed total mean squared error. */
   readonly target: number;
 }
 
-/** A step is at most so many times as large, or small, as the usual one. */
+/** Maximum ratio between a step and the usual one. */
 const FARTHEST = 8;
-/** Share of the error that an attribute makes at least, as far as is known. */
+/** Minimum fraction of the error of an attribute. */
 const LEAST_SHARE = 1e-3;
 
 /**
- * Steps at which a bit more saves the same error everywhere: the error of an attribute goes with the square of its step, its bits with the logarithm, so that each may make as
- * much of the error as it has numbers. What the usual steps of each make is measured, by doubling them in turn.
+ * Finds steps such that an additional bit saves the same error in every attribute: the error of an attribute grows with
+ * the square of its step, its bits with the logarithm, so each may have a fraction of the error in proportion to its
+ * numbers. The error of each usual step is measured by doubling it.
  */
 export async function allocateSteps<K extends string>(options: AllocateOptions<K>): Promise<Steps<K>> {
   const { usual, numbers, measure, target } = options;
@@ -40,17 +41,20 @@ export interface FindStepsOptions<
   K extends string,
   Found extends { readonly error: number },
 > extends AllocateOptions<K> {
-  /** Part of the target that steps are allocated for, if something else makes errors, too; default: all of it. */
+  /** Fraction of the target for the steps, if there are other sources of error; default: all of it. */
   readonly share?: number;
-  /** Finds the error of steps, and more, as the result is judged; default: {@link AllocateOptions.measure}. */
+  /**
+   * Measures the error of steps, and more, under the conditions of the result; default: {@link
+   * AllocateOptions.measure}.
+   */
   readonly judge?: (steps: Steps<K>) => Promise<Found>;
-  /** Part of the target at which the search ends; default 0.97. */
+  /** The search ends at this fraction of the target; default 0.97. */
   readonly nearEnough?: number;
 }
 
 /**
  * Finds the coarsest steps within an error: {@link allocateSteps} balances them, {@link fitSteps} scales all of them.
- * @returns the steps, and what `judge` found with them
+ * @returns The steps, and the result of `judge` for them.
  */
 export async function findSteps<K extends string, Found extends { readonly error: number }>(
   options: FindStepsOptions<K, Found>,
@@ -64,7 +68,7 @@ export async function findSteps<K extends string, Found extends { readonly error
 export const scaledSteps = <K extends string>(steps: Steps<K>, factor: number): Steps<K> =>
   Object.fromEntries(Object.entries<number>(steps).map(([name, step]) => [name, step * factor])) as Steps<K>;
 
-/** What steps times a factor came to. */
+/** Result of a scale factor. */
 interface Tried {
   readonly scale: number;
   readonly error: number;
@@ -72,19 +76,19 @@ interface Tried {
 
 export interface FitStepsOptions<K extends string, Found extends { readonly error: number }> {
   readonly steps: Steps<K>;
-  /** What is found with some steps, a mean squared error above all. */
+  /** Measures some steps; the result contains a mean squared error. */
   readonly measure: (steps: Steps<K>) => Promise<Found>;
-  /** Mean squared error that is allowed. */
+  /** Allowed mean squared error. */
   readonly target: number;
-  /** Measurements at most; default 6. */
+  /** Maximum number of measurements; default 6. */
   readonly tries?: number;
-  /** Part of the target that is near enough to end with; default 0.97. */
+  /** The search ends at this fraction of the target; default 0.97. */
   readonly nearEnough?: number | undefined;
 }
 
 /**
- * The same steps, times the factor with which they err as much as is allowed, or nearly.
- * @returns the steps, and what was found with them; the finest that were tried where all err too much
+ * Scales steps so that their error is near the allowed one.
+ * @returns The steps, and the measurement; the finest tried steps if all exceed the limit.
  */
 export async function fitSteps<K extends string, Found extends { readonly error: number }>(
   options: FitStepsOptions<K, Found>,
@@ -102,12 +106,15 @@ export async function fitSteps<K extends string, Found extends { readonly error:
   return tried.findLast(({ error }) => error <= target) ?? tried[0];
 }
 
-/** How many times as large, or small, as the one before a scale is at most. */
+/** Maximum ratio between two consecutive scales. */
 const FARTHEST_SCALE = 3;
-/** Errors go with the square of the scale as a rule; where two tries tell that they grow more slowly, with this power of it at least. */
+/**
+ * Lower limit of the exponent of the error as a function of the scale, which is usually 2, but may be lower between two
+ * tries.
+ */
 const LEAST_SLOPE = 0.5;
 
-/** A scale between tries above and below the figure, or beyond those that are all on one side of it. */
+/** A scale between tries above and below the target, or beyond those that are all on one side of it. */
 function nextScale(tried: readonly Tried[], aim: number): number {
   const [below, above] = tried.reduce<readonly [Tried?, Tried?]>(
     ([low, high], one) =>

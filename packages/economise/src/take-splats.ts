@@ -1,19 +1,19 @@
 import { shCoefficientCount } from '@gaussian-splat/core';
 import type { Columns } from './parts/cloud-memory.js';
 
-/** Splats to be taken out of a cloud. */
+/** Splats to copy from a cloud. */
 export interface Taking {
   readonly from: Columns;
   readonly to: Columns;
-  /** Numbers of the splats in `from`. */
+  /** Indices of the splats in `from`. */
   readonly kept: Uint32Array;
   /** Degree that each of them keeps. */
   readonly degrees: Uint8Array;
-  /** Place of the first of them in `to`. */
+  /** Index of the first of them in `to`. */
   readonly at: number;
 }
 
-/** Copies splats to their places in a new order. Of those that keep a lower degree than they had, the coefficients stay as they are. */
+/** Copies splats in a new order. Coefficients of splats with a reduced degree stay unchanged. */
 export function takeSplats({ from, to, kept, degrees, at }: Taking): void {
   takeRows(from.positions, to.positions, 3, kept, at);
   takeRows(from.scales, to.scales, 3, kept, at);

@@ -5,25 +5,25 @@ export interface ViewOptions {
   readonly height?: number;
   /** Vertical field of view, radians. */
   readonly fovYRadians?: number;
-  /** Another number gives other views, none of which is among the first. */
+  /** Another seed gives a disjoint set of views. */
   readonly seed?: number;
 }
 
-/** Distances from the middle of the subject, in its radii: from close by to all of it in view. */
+/** Distances from the center of the subject, in its radii: from close to the whole subject in view. */
 const DISTANCES = [1.5, 1.9, 2.4, 3.2];
-/** Height of the eye above the subject, radians: from a little below to well above. */
+/** Height of the eye above the subject, radians: from slightly below to well above. */
 const ELEVATIONS: readonly [number, number] = [-0.35, 1.1];
 
 /**
- * Views around a subject for scenes that come without cameras: evenly spread around it, at several heights and distances, looking
- * at points near its middle. Up is -y, as in captures.
+ * Views around a subject for scenes without cameras: evenly spaced around it, at several heights and distances, looking
+ * at points near its center. Up is -y, as in captures.
  */
 export function viewsAround(bounds: Bounds, count: number, options: ViewOptions = {}): Camera[] {
   const { width = 480, height = 270, fovYRadians = 0.7, seed = 0 } = options;
   const { center, radius } = bounds;
   const f = height / (2 * Math.tan(fovYRadians / 2));
   return Array.from({ length: count }, (_, k) => {
-    // Additive sequences with irrational steps: no two sets of views share one, and every set covers all of it.
+    // Additive sequences with irrational steps: no two sets of views share one, and every set covers the whole range.
     const at = (step: number): number => ((k + 0.5 + 97 * seed) * step) % 1;
     const azimuth = 2 * Math.PI * at(0.6180339887);
     const elevation = ELEVATIONS[0] + (ELEVATIONS[1] - ELEVATIONS[0]) * at(0.7548776662);
@@ -51,7 +51,10 @@ export function viewsAround(bounds: Bounds, count: number, options: ViewOptions 
 /** Distances of {@link viewsFromEverywhere}, in radii of the subject: every fifth from within it. */
 const EVERYWHERE = [...DISTANCES, 0.6];
 
-/** Views of a subject from all directions, from below, too, and from within: what no visitor of these sees hardly matters. */
+/**
+ * Views of a subject from all directions, including from below and from within: parts that none of these show hardly
+ * matter.
+ */
 export function viewsFromEverywhere(bounds: Bounds, count: number, options: ViewOptions = {}): Camera[] {
   const { center, radius } = bounds;
   return viewsAround(bounds, count, options).map((view, k) => {
@@ -65,12 +68,18 @@ export function viewsFromEverywhere(bounds: Bounds, count: number, options: View
   });
 }
 
-/** Distances of views that visitors may take, in radii: from within the subject, where its splats are largest, to all of it in view. */
+/**
+ * Distances of visitors' views, in radii: from within the subject, which enlarges its splats the most, to the whole
+ * subject in view.
+ */
 const VISITED_DISTANCES = [0.5, 0.75, 1.1, 1.6, 2.3, 3.2];
-/** The element lets cameras go as far above a subject, and below it, radians. */
+/** Range of the element's cameras above and below a subject, radians. */
 const VISITED_ELEVATION = 1.17;
 
-/** Views that visitors may take of a subject: nearer than captures go, and from below, too; looking at points near its middle. */
+/**
+ * Views that visitors may take of a subject: nearer than in captures, and also from below; looking at points near its
+ * center.
+ */
 function viewsOfVisitors(bounds: Bounds, count: number, options: ViewOptions): Camera[] {
   const { center, radius } = bounds;
   return viewsAround(bounds, count, options).map((view, k) => {
@@ -87,18 +96,21 @@ function viewsOfVisitors(bounds: Bounds, count: number, options: ViewOptions): C
   });
 }
 
-/** Pixels of the frames that people look at. */
+/** Pixels of the frames on visitors' screens. */
 const FULL_PIXELS = 1920 * 1080;
-/** Pixels of the excerpts of these that errors are measured in: a whole one takes nine times as long and says the same of the scene. */
+/** Errors are measured in crops of this many pixels: a whole frame takes nine times as long and gives the same result. */
 const EXCERPT_PIXELS = 640 * 360;
 
-/** The size of frames in which errors of a view are measured: of as many pixels as people look at, where the view has fewer. */
+/** Frame size for measuring errors of a view: at least the pixels of visitors' screens. */
 function fullSizeOf({ width, height }: Pick<Camera, 'width' | 'height'>): { width: number; height: number } {
   const share = Math.max(1, Math.sqrt(FULL_PIXELS / (width * height)));
   return { width: Math.round(share * width), height: Math.round(share * height) };
 }
 
-/** Excerpts of views in as many pixels as people look at: what a cut costs depends on the size of pixels, most where splats are smaller. */
+/**
+ * Crops of views at the resolution of visitors' screens, because the cost of a cut depends on the size of pixels,
+ * especially for small splats.
+ */
 export function excerptsOf(views: readonly Camera[]): Camera[] {
   return views.map((view, k) => {
     const full = fullSizeOf(view);
@@ -106,7 +118,7 @@ export function excerptsOf(views: readonly Camera[]): Camera[] {
     const share = Math.min(1, Math.sqrt(EXCERPT_PIXELS / (full.width * full.height)));
     const [width, height] = [full.width, full.height].map((side) => Math.round(share * side));
     const at = (step: number): number => ((k + 0.5) * step) % 1;
-    // Near the middle more often than at the edges, where subjects may not reach.
+    // Near the center more often than at the edges, which subjects may not reach.
     const [left, top] = [0.2 + 0.6 * at(0.5545497), 0.2 + 0.6 * at(0.3085152)];
     return {
       ...view,
@@ -117,20 +129,21 @@ export function excerptsOf(views: readonly Camera[]): Camera[] {
   });
 }
 
-/** Views dealt out by what they are for. */
+/** Views divided by purpose. */
 export interface DealtViews {
-  /** Splats are scored by what they contribute here. */
+  /** Views for scoring the contribution of splats. */
   readonly scored: readonly Camera[];
-  /** How much may go is found here. */
+  /** Views for finding the size of the cut. */
   readonly searched: readonly Camera[];
-  /** Nothing but the result is measured here. */
+  /** Views used only for measuring the result. */
   readonly heldOut: readonly Camera[];
 }
 
 /**
- * Views halfway between each camera and its nearest neighbour: what visitors see who move on from where images were taken. Scores of few cameras take
- * their very places for all there are. Between two that look in opposite directions, as of a panorama taken apart, there is none.
- * @param all cameras that may be the neighbour; default the same
+ * Views halfway between each camera and its nearest neighbor, as seen by visitors who move away from the capture
+ * positions. Scores from few cameras would overfit their exact positions. Cameras in opposite directions, as in a
+ * divided panorama, give none.
+ * @param all All cameras that may be the neighbor; default: the same.
  */
 export function viewsBetween(views: readonly Camera[], all: readonly Camera[] = views): Camera[] {
   const eyes = all.map(({ worldToCamera }) => eyeOf(worldToCamera));
@@ -150,10 +163,10 @@ export function viewsBetween(views: readonly Camera[], all: readonly Camera[] = 
   });
 }
 
-/** Mean axes that are shorter, or nearer to one line, tell no direction. */
+/** Mean axes that are shorter, or nearly parallel, define no orientation. */
 const LEAST_AXIS = 1e-3;
 
-/** A pose between two: the eye in the middle, the axes the mean ones, set at right angles again; undefined where these are none. */
+/** A pose between two: the eye in the middle, the axes averaged and orthogonalized; undefined if they are degenerate. */
 function halfway(a: Camera, b: Camera): Camera['worldToCamera'] | undefined {
   const [eyeA, eyeB] = [eyeOf(a.worldToCamera), eyeOf(b.worldToCamera)];
   const eye = eyeA.map((value, axis) => (value + eyeB[axis]) / 2) as [number, number, number];
@@ -165,31 +178,35 @@ function halfway(a: Camera, b: Camera): Camera['worldToCamera'] | undefined {
   return lookAt(eye, target, [-down[0], -down[1], -down[2]]);
 }
 
-/** Deals views out: of ten that follow one another, one is for the search, two are held out, and splats are scored in the rest. */
+/** Divides views: of ten consecutive ones, one is for the search, two are held out, and the rest are for scoring. */
 export function dealViews(views: readonly Camera[]): DealtViews {
   const of = (...places: number[]): Camera[] => views.filter((_, k) => places.includes(k % 10));
   return { scored: of(0, 1, 3, 4, 5, 6, 8), searched: of(2), heldOut: of(7, 9) };
 }
 
 export interface DealtViewOptions extends Omit<ViewOptions, 'seed'> {
-  /** Views to score in; default 216. Colours of fewer bands come nearer to what others see the more views there are. */
+  /** Number of scoring views; default 216. More views give better colors at lower degrees. */
   readonly scored?: number;
 }
 
-/** Seeds of the three kinds: so far apart that no number of views to score in reaches those of the others. */
+/** Seeds of the three kinds, far enough apart that scoring views never coincide with the others. */
 const [SEARCHED_SEED, HELD_OUT_SEED, SCORED_SEED] = [1, 2, 10];
 
-/** Each distance four times: with six views in all the figure depended on which by a decibel or two (packages/economise/README.md). */
+/**
+ * Four views at each distance: with only six views the result depended on the selection by a decibel or two
+ * (packages/economise/README.md).
+ */
 const HELD_OUT = 24;
 
-/** Views around a subject, of one size: 216 to score in, 8 to search in, 24 held out. */
+/** Views around a subject, all of one size: 216 for scoring, 8 for the search, 24 held out. */
 export function dealtViewsAround(bounds: Bounds, { scored = 216, ...options }: DealtViewOptions = {}): DealtViews {
   return dealt(scored, (count, seed) => viewsAround(bounds, count, { ...options, seed }));
 }
 
 /**
- * Views that visitors may take of a scene without cameras: 0.5 to 3.2 radii from its middle, up to 67° above it and below. Errors are measured in excerpts of frames of 1920 x 1080.
- * @param scored views to score in
+ * Views that visitors may take of a scene without cameras: 0.5 to 3.2 radii from its center, up to 67° above and below
+ * it. Errors are measured in crops of frames of 1920 x 1080.
+ * @param scored Number of scoring views.
  */
 export function dealtViewsOfVisitors(bounds: Bounds, scored = 216): DealtViews {
   const { searched, heldOut, ...rest } = dealt(scored, (count, seed) => viewsOfVisitors(bounds, count, { seed }));
@@ -202,12 +219,12 @@ const dealt = (scored: number, viewsOf: (count: number, seed: number) => Camera[
   heldOut: viewsOf(HELD_OUT, HELD_OUT_SEED),
 });
 
-/** Least pixels of views that splats are scored in: in smaller ones most of a scene is smaller than a pixel, and seems unneeded. */
+/** Minimum pixels of scoring views, because most splats are smaller than a pixel in smaller views, and seem unneeded. */
 const LEAST_SCORED_PIXELS = 480 * 270;
 
 /**
- * Deals a scene's own views out ({@link dealViews}). Splats are scored between neighbours, too, and errors are measured there as well as in the views themselves, in excerpts of
- * frames of as many pixels as visitors look at.
+ * Divides a scene's own views ({@link splitViews}). Views between neighbors are added for scoring and for measuring
+ * errors, in crops of frames at the resolution of visitors' screens.
  */
 export function dealOwnViews(views: readonly Camera[]): DealtViews {
   const { scored, searched, heldOut } = dealViews(views);

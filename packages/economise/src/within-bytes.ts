@@ -2,21 +2,21 @@ import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { economise, type Economised, type EconomiseOptions } from './economise.js';
 
 export interface EconomisedWithin extends Economised {
-  /** PSNR that the search asked for, dB. */
+  /** PSNR target of the search, dB. */
   readonly minDecibels: number;
 }
 
-/** PSNR that the search begins with, dB. */
+/** Initial PSNR of the search, dB. */
 export const FIRST_DECIBELS = 45;
 const LEAST_DECIBELS = 15;
 const DECIBELS_STEP = 6;
 const MAX_TRIES = 7;
-/** Share of the bytes at which the search ends. */
+/** The search ends at this fraction of the bytes. */
 const FULL_ENOUGH = 0.97;
 
 /**
- * Finds the most accurate file of at most `maxBytes`: {@link economise} by bisection of its PSNR.
- * @throws GaussianSplatError `argument/value` if no file of 15 dB or more is that small
+ * Finds the most accurate file of at most `maxBytes`: bisects the PSNR of {@link compressScene}.
+ * @throws GaussianSplatError `argument/value` if no file of 15 dB or more is that small.
  */
 export async function economiseWithin(
   cloud: GaussianCloud,

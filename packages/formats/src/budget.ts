@@ -1,24 +1,28 @@
 import { GaussianSplatError, shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 
-/** What one load may cost at most. What is left out is not limited, beyond what the file's own bytes allow: see SECURITY.md. */
+/** Upper limits of one load. Missing limits default to the bound by the file's own bytes: see SECURITY.md. */
 export interface LoadLimits {
-  /** Splats that are read, those of all levels of detail together. */
+  /** Maximum number of splats, over all levels of detail. */
   readonly maxSplats?: number;
-  /** Bytes of memory: those that arrive, and those that are allocated for what they unpack to. */
+  /** Maximum bytes of memory: downloaded bytes, plus allocations for unpacking them. */
   readonly maxBytes?: number;
-  /** Seconds from the beginning of the load to its end, the download included. */
+  /** Seconds from the beginning of the load to its end, including the download. */
   readonly maxSeconds?: number;
 }
 
-/** Bytes that every load may take, whatever arrives; */
+/** Bytes that every load may allocate, independent of its size, */
 const FREE_BYTES = 2 ** 26;
-/** and for each byte that has arrived. Real scenes need 1 to 100: a splat of SOG has 3 bytes or more, and takes up to 500 on its way. */
+/**
+ * plus this number for each downloaded byte. Real scenes need 1 to 100: a splat of SOG has 3 bytes or more, and takes
+ * up to 500 during decoding.
+ */
 const BYTES_PER_BYTE = 256;
 
 /**
- * What one load has taken, and may take. All that a file can name more than once, or announce, is charged here before it is allocated, all of it to the same account:
- * nothing is given back, so that work is bounded as memory is. Loops that allocate nothing charge their steps as bytes.
+ * Account of one load and its limits. Everything that a file can repeat or declare is charged to it before it is
+ * allocated. Nothing is refunded, which bounds work as well as memory. Loops without allocations charge their steps as
+ * bytes.
  */
 export class LoadBudget {
   readonly #limits: LoadLimits;
@@ -26,36 +30,36 @@ export class LoadBudget {
   #arrived: number;
   #taken = 0;
 
-  /** @param arrived bytes of the scene's own file */
+  /** @param arrived Bytes of the scene's own file. */
   constructor(arrived: number, limits: LoadLimits = {}) {
     this.#arrived = arrived;
     this.#limits = limits;
   }
 
-  /** Bytes of all files that have arrived. */
+  /** Downloaded bytes over all files. */
   get arrived(): number {
     return this.#arrived;
   }
 
-  /** Bytes that have been charged. */
+  /** Charged bytes. */
   get taken(): number {
     return this.#taken;
   }
 
-  /** Bytes that may be charged in all. */
+  /** Maximum total of charged bytes. */
   get allowed(): number {
     const left = (this.#limits.maxBytes ?? Infinity) - this.#arrived;
     return Math.max(0, Math.min(FREE_BYTES + BYTES_PER_BYTE * this.#arrived, left));
   }
 
-  /** Another file of the scene has arrived, which allows for more. */
+  /** Adds another file of the scene, which raises the limit. */
   arrive(bytes: number): void {
     this.#arrived += bytes;
   }
 
   /**
-   * Charges bytes that are about to be allocated.
-   * @param where what error messages call the file
+   * Charges bytes before they are allocated.
+   * @param where Name of the file in error messages.
    * @throws GaussianSplatError `out-of-memory/budget`
    */
   take(bytes: number, where: string): void {
@@ -79,7 +83,7 @@ export class LoadBudget {
   }
 }
 
-/** Throws the error for what is over a limit. */
+/** Throws the error for an exceeded limit. */
 export function refuse(where: string, expected: string, found: string, cause?: unknown): never {
   throw new GaussianSplatError('out-of-memory/budget', {
     where,

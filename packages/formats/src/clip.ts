@@ -1,4 +1,4 @@
-/** Clips: scenes that change over time, in one file that is read by byte ranges. docs/sequences.md describes it. */
+/** Clips: animated scenes in one file that is read by byte ranges. docs/sequences.md describes it. */
 import { keepUsable, type Bounds, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { grouped, startsWith, viewOf } from './bytes.js';
@@ -16,32 +16,32 @@ export const MAX_CLIP_INDEX_BYTES = 1 << 24;
 const MAX_GROUP_FRAMES = 4096;
 const MAX_PARTS = 8;
 const MAX_GROUPS = 1_000_000;
-/** Planes of codes of a splat, for each frame of its group at most. */
+/** Maximum number of code planes of a splat for each frame of its group. */
 const PLANES_PER_FRAME = MOVING_NAMES.reduce((sum, name) => sum + MOVING[name], 0);
 
-/** Some of the splats of a group, and how they move: two pieces of the file, one behind the other. */
+/** Some of the splats of a group, and their motion: two contiguous sections of the file. */
 export interface ClipPart {
-  /** Byte of the file at which its scene begins; its motion follows. */
+  /** Byte offset of its scene in the file; its motion follows. */
   readonly start: number;
   /** Bytes of the splats, a scene file of any format. */
   readonly sceneBytes: number;
-  /** Bytes of what they do, a file of motion. */
+  /** Bytes of their motion. */
   readonly motionBytes: number;
   readonly splats: number;
   /** Planes of codes in the motion. */
   readonly planes: number;
 }
 
-/** Frames that follow one another, and need nothing of other groups. */
+/** Consecutive frames that are independent of other groups. */
 export interface ClipGroup {
-  /** Number of its first frame in the clip. */
+  /** Index of its first frame in the clip. */
   readonly first: number;
   readonly frames: number;
-  /** The first part alone is a coarse image of the group; all parts together are all splats. */
+  /** The first part is a coarse version of the group; all parts together contain all splats. */
   readonly parts: readonly ClipPart[];
 }
 
-/** What the beginning of the file says of the rest. */
+/** Index at the beginning of the file. */
 export interface ClipIndex {
   readonly framesPerSecond: number;
   readonly frameCount: number;
@@ -51,14 +51,14 @@ export interface ClipIndex {
   readonly bounds: Bounds & { readonly up?: Vector3 | undefined };
   readonly antialiased: boolean;
   readonly filterVariance?: number | undefined;
-  /** By how much splats of the first part are enlarged while the others are missing. */
+  /** Factor that enlarges the splats of the first part while the others are missing. */
   readonly grow: number;
   readonly groups: readonly ClipGroup[];
   /** Bytes of the whole file. */
   readonly byteLength: number;
 }
 
-/** What {@link writeClipHead} writes; places follow from lengths. */
+/** Input of {@link writeClipHead}; offsets follow from lengths. */
 export interface ClipHead extends Omit<ClipIndex, 'groups' | 'byteLength' | 'frameCount' | 'durationSeconds'> {
   readonly groups: readonly {
     readonly frames: number;
@@ -81,9 +81,10 @@ export function clipIndexBytes(head: Uint8Array, name: string): number {
 }
 
 /**
- * Reads head and index.
- * @param bytes of the beginning of the file; there may be more of them
- * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`, `out-of-memory/budget`
+ * Parses head and index.
+ * @param bytes Beginning of the file, at least up to the end of the index.
+ * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`,
+ * `out-of-memory/budget`
  */
 export function parseClip(bytes: Uint8Array, name: string, limits: LoadLimits = {}): ClipIndex {
   const length = clipIndexBytes(bytes, name);
@@ -94,7 +95,7 @@ export function parseClip(bytes: Uint8Array, name: string, limits: LoadLimits = 
   return new IndexReader(json, name).read(CLIP_HEAD_BYTES + length);
 }
 
-/** Checks what an index says. */
+/** Validates an index. */
 class IndexReader {
   readonly #json: Json;
   readonly #name: string;
@@ -188,7 +189,7 @@ class IndexReader {
   }
 }
 
-/** Head and index of a file; what the parts hold follows, in their order. */
+/** Writes head and index of a file; the content of the parts follows, in their order. */
 export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayBuffer> {
   const rows = groups.map(({ frames, parts }) => [
     frames,
@@ -204,7 +205,7 @@ export function writeClipHead({ groups, ...facts }: ClipHead): Uint8Array<ArrayB
   return bytes;
 }
 
-/** Number of the group that a frame is in. */
+/** Index of the group that contains a frame. */
 export function clipGroupAt({ groups }: Pick<ClipIndex, 'groups'>, frame: number): number {
   let [low, high] = [0, groups.length - 1];
   while (low < high) {
@@ -215,7 +216,7 @@ export function clipGroupAt({ groups }: Pick<ClipIndex, 'groups'>, frame: number
   return low;
 }
 
-/** What a part holds. */
+/** Decoded content of a part. */
 export interface ClipPartContent {
   readonly cloud: GaussianCloud;
   readonly motion: Motion;
@@ -232,7 +233,7 @@ export interface ClipPartSource {
 
 /**
  * Reads a part of a group.
- * @throws GaussianSplatError as `readScene` and `readMotion` do, and `decode/header` where the index says otherwise
+ * @throws GaussianSplatError as `readScene` and `readMotion` do, and `decode/header` if it contradicts the index.
  */
 export async function readClipPart({ bytes, part, frames, name, limits }: ClipPartSource): Promise<ClipPartContent> {
   const { sceneBytes, motionBytes, splats, planes } = part;
@@ -253,8 +254,8 @@ export async function readClipPart({ bytes, part, frames, name, limits }: ClipPa
 }
 
 /**
- * The splats of a frame that are alive in it.
- * @param frame of the group, 0 being its first
+ * Returns the live splats of a frame.
+ * @param frame Index within the group.
  * @throws GaussianSplatError `decode/empty`, `out-of-memory/budget`
  */
 export function clipFrame(

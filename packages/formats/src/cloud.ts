@@ -1,7 +1,7 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import type { SceneSource } from './scene-format.js';
 
-/** Value of the constant spherical harmonic, 1/(2·sqrt(pi)): colour = 0.5 + SH_C0·f_dc. */
+/** Value of the constant spherical harmonic, 1/(2·sqrt(pi)): color = 0.5 + SH_C0·f_dc. */
 export const SH_C0 = 0.28209479177387814;
 
 /** A cloud whose arrays a reader is filling. */
@@ -9,7 +9,7 @@ export type DraftCloud = {
   -readonly [K in keyof GaussianCloud]: GaussianCloud[K];
 };
 
-/** A cloud of zeros of the given size. Throws `out-of-memory/budget` where the load may not take as much. */
+/** Allocates a cloud of zeros. Throws `out-of-memory/budget` if the load may not allocate as much. */
 export function allocateCloud(
   count: number,
   shDegree: ShDegree,
@@ -30,17 +30,17 @@ export function allocateCloud(
   };
 }
 
-/** Replaces logits by opacities, 1/(1 + exp(-x)), in place. */
+/** Converts logits to opacities, 1/(1 + exp(-x)), in place. */
 export function sigmoidInPlace(values: Float32Array): void {
   for (let i = 0; i < values.length; i++) values[i] = 1 / (1 + Math.exp(-values[i]));
 }
 
-/** Replaces logarithms of standard deviations by the standard deviations, in place. */
+/** Converts logarithms of standard deviations to standard deviations, in place. */
 export function expInPlace(values: Float32Array): void {
   for (let i = 0; i < values.length; i++) values[i] = Math.exp(values[i]);
 }
 
-/** The degree of spherical harmonics with this many coefficients above the constant one, for each colour channel. */
+/** The degree of spherical harmonics with this many coefficients above the constant one, for each color channel. */
 export const DEGREE_OF_REST_COUNT: ReadonlyMap<number, ShDegree | 4> = new Map([
   [0, 0],
   [3, 1],
@@ -50,8 +50,8 @@ export const DEGREE_OF_REST_COUNT: ReadonlyMap<number, ShDegree | 4> = new Map([
 ]);
 
 /**
- * Degree that is kept of a file's degree. Degree 4 is cut to 3, the highest a cloud holds: spherical harmonics are
- * orthogonal, so leaving out the last band gives the nearest colours that degree 3 can.
+ * Degree that is kept of a file's degree. Degree 4 is truncated to 3, the maximum of a cloud: spherical harmonics are
+ * orthogonal, so dropping the last band gives the nearest colors of degree 3.
  */
 export function keptDegree(degree: ShDegree | 4): ShDegree {
   return degree === 4 ? 3 : degree;

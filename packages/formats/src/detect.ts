@@ -4,12 +4,12 @@ import type { SceneFormat, SceneFormatName } from './scene-format.js';
 import { looksLikeSplats } from './splat/plausible.js';
 
 /**
- * Tells the format of a scene file: by its content first; by the extension of `name` second, for formats without a
- * signature; by the media type third; and as a last resort by whether its numbers look like those of a `.splat` file.
+ * Detects the format of a scene file: first by its content; second by the extension of `name`, for formats without a
+ * signature; third by the media type; and finally by whether its numbers resemble those of a `.splat` file.
  *
- * @param name file name or URL; a query and a fragment are ignored.
- * @param contentType media type as a server sends it; parameters after a semicolon are ignored.
- * @returns the name of the format, or undefined if the file is none that `readScene` reads.
+ * @param name File name or URL; a query and a fragment are ignored.
+ * @param contentType Media type from the server; parameters after a semicolon are ignored.
+ * @returns Name of the format, or undefined if `readScene` does not support the file.
  */
 export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): SceneFormatName | undefined {
   return findFormat(bytes, name, contentType)?.name;
@@ -19,7 +19,7 @@ export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): Sc
 export function findFormat(bytes: Uint8Array, name: string, contentType: string): SceneFormat | undefined {
   const signed = sceneFormats.find(({ hasSignature }) => hasSignature?.(bytes));
   if (signed || bytes.length === 0) return signed;
-  // The first bytes of a `.splat` may be any, those of a text too.
+  // A `.splat` may begin with any bytes, even with text.
   const isSplat = extensionOf(name) === '.splat' && looksLikeSplats(bytes, 'all');
   if (!isSplat && foreignName(bytes)) return undefined;
   const unsigned = sceneFormats.filter(({ hasSignature, isSignatureWeak }) => !hasSignature || isSignatureWeak);
@@ -32,7 +32,10 @@ export function findFormat(bytes: Uint8Array, name: string, contentType: string)
   );
 }
 
-/** Extension of a file name or URL in lower case, with its dot; empty if there is none. Files may be called `scene #3.splat`, and addresses end in a name. */
+/**
+ * Extension of a file name or URL in lower case, with its dot; empty if there is none. Handles files such as `scene
+ * #3.splat`, and addresses that end in a name.
+ */
 export function extensionOf(name: string): string {
   return /\.[a-z0-9]+(?=[?#]|$)/i.exec(name)?.[0].toLowerCase() ?? '';
 }

@@ -1,15 +1,15 @@
-/** Says what a file is that is no scene: loaded when one has been refused. */
+/** Identifies files that are not scenes: loaded after one has been rejected. */
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
 import { asciiOf, grouped, quote } from './bytes.js';
 import { foreignName, sampleText, type ForeignName } from './foreign-signatures.js';
 import { UNREAD_KINDS, unreadKind, type UnreadKind } from './unread-kinds.js';
 
-/** A kind of file that is recognised only to say what it is. */
+/** A kind of file that is recognized only for an error message. */
 interface ForeignKind {
   readonly code: ErrorCode;
   readonly found: string;
   readonly remedy: string;
-  /** True if the first words help to recognise the file. */
+  /** Whether the first words help to identify the file. */
   readonly isText?: boolean;
 }
 
@@ -28,7 +28,7 @@ const foreign = (found: string, isText = false): ForeignKind => ({
   isText,
 });
 
-/** What has a signature that no scene format shares. */
+/** Kinds with a signature that no scene format shares. */
 const SIGNED_KINDS: Readonly<Record<ForeignName, ForeignKind>> = {
   lfsPointer: {
     code: 'decode/lfs-pointer',
@@ -72,20 +72,20 @@ const ONNX_MODEL: ForeignKind = {
   remedy: NOT_A_SCENE,
 };
 
-/** SuperSplat's and splat-transform's viewer, which may have the scene in it. */
+/** The viewer page of SuperSplat and splat-transform, which may contain the scene. */
 const VIEWER_PAGE: ForeignKind = {
   code: 'decode/html',
   found: 'the page of a viewer (SuperSplat), not the scene that it shows',
   remedy: 'give the address of the scene file, or export the scene again as .sog, .spz or .ply',
 };
 
-/** Such pages have their title, or the setup of their viewer, within so many bytes. */
+/** Such pages contain their title, or the setup of their viewer, within this number of bytes. */
 const PAGE_BYTES = 65_536;
 
 const isViewerPage = (bytes: Uint8Array): boolean =>
   /<title>\s*SuperSplat|sse-viewer|supersplat-viewer/i.test(asciiOf(bytes, 0, PAGE_BYTES));
 
-/** Kinds whose signature is weak: asked for only where neither content nor name speaks for a scene. */
+/** Kinds with a weak signature: tested only if neither content nor name indicates a scene. */
 function unsignedKind(bytes: Uint8Array): ForeignKind {
   if (isOnnx(bytes)) return ONNX_MODEL;
   return /^[\t\n\r -~]+$/.test(sampleText(bytes))
@@ -93,14 +93,14 @@ function unsignedKind(bytes: Uint8Array): ForeignKind {
     : foreign(`bytes that begin with ${hexOf(bytes)}`);
 }
 
-/** What an ONNX file begins with: field 1 (IR version) and then field 2 (producer) or 7 (graph) of its protobuf. */
+/** Start of an ONNX file: field 1 (IR version) and then field 2 (producer) or 7 (graph) of its protobuf. */
 function isOnnx(bytes: Uint8Array): boolean {
   return bytes.length > 8 && bytes[0] === 8 && bytes[1] > 0 && bytes[1] < 32 && [0x12, 0x3a].includes(bytes[2]);
 }
 
 const A_SCENE = 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, .ksplat or glTF)';
 
-/** The error that says what a file is that no reader knows: by its signature, by its name, or else by its bytes. */
+/** Returns the error for a file in an unknown format, identified by its signature, its name, or else its bytes. */
 export function diagnose(
   bytes: Uint8Array,
   name: string,
@@ -108,7 +108,7 @@ export function diagnose(
   expected: string = A_SCENE,
 ): GaussianSplatError {
   const signed = foreignName(bytes);
-  // A JSON text may be one of them; whatever else has a signature is none.
+  // A JSON text may be one of them; files with another signature are not.
   const known = !signed || signed === 'json' ? unreadKind(bytes, sampleText(bytes), extension) : undefined;
   if (known) return refusal(unread(known), name, undefined);
   if (signed === 'html' && isViewerPage(bytes)) return refusal(VIEWER_PAGE, name, bytes, expected);
@@ -117,13 +117,13 @@ export function diagnose(
     : refusal(unsignedKind(bytes), name, bytes, expected);
 }
 
-/** The error for an archive that is known for a path in it; undefined for all others. */
+/** Returns the error for an archive that is recognized by a path in it; undefined for all others. */
 export function diagnoseArchive(paths: readonly string[], name: string): GaussianSplatError | undefined {
   const known = UNREAD_KINDS.find(({ within }) => within && paths.some((path) => within.test(path)));
   return known && refusal(unread(known), name, undefined);
 }
 
-/** Names the content of a file for an error message. */
+/** Describes the content of a file for an error message. */
 export function describeContent(bytes: Uint8Array): string {
   if (sampleText(bytes).startsWith('ply')) return 'a PLY file';
   const signed = foreignName(bytes);

@@ -4,19 +4,19 @@ import { grouped, GrowingBytes } from './bytes.js';
 import { badStatus, forbidden, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
-/** Bytes before the break that are asked for again, and compared: a tag may be the same, and the file another. */
+/** Bytes before the interruption that are requested again and compared, because two files may have the same ETag. */
 const OVERLAP = 1024;
 
-/** One file on its way, over one connection after another. */
+/** The download of one file over several connections. */
 export class Download {
   readonly #address: URL;
   readonly #options: FetchSceneOptions;
   #response: Response | undefined;
   #body = new GrowingBytes(0);
-  /** Byte of the file that the response begins with. */
+  /** Byte offset of the response in the file. */
   #at = 0;
   #total: number | undefined;
-  /** What tells one state of the file from another; undefined where the server or CORS keeps it hidden. */
+  /** Validator of the file's version (ETag or date); undefined if the server or CORS hides it. */
   #tag: string | undefined;
 
   constructor(address: URL, options: FetchSceneOptions) {
@@ -24,15 +24,15 @@ export class Download {
     this.#options = options;
   }
 
-  /** All bytes so far. */
+  /** All received bytes. */
   get bytes(): Uint8Array {
     return this.#body.view();
   }
 
-  /** Asks for the whole file. @returns the error of a server that has no time now. */
+  /** Requests the whole file. @returns The error of a server that is temporarily unavailable. */
   async start(): Promise<Error | undefined> {
     const response = await this.#request({});
-    // A partial answer or an empty one is no file, although its status is no error.
+    // A partial or empty response is not the file, although its status is not an error.
     if (response.status === 200 || response.status === 203) return void this.#begin(response);
     await discard(response);
     const error = badStatus(this.#address, response);
@@ -57,15 +57,17 @@ export class Download {
   }
 
   /**
-   * Asks for what is missing where it can be told whether that belongs to what has come, or for all of it; of a server that sends the whole file again, that is taken.
-   * @returns false if nobody answers, the server has no time now, or the file is another: then all of it is to be asked for again
+   * Requests the missing range if a validator allows it, otherwise the whole file. A server that sends the whole file
+   * again is accepted.
+   * @returns False if there is no response, the server is temporarily unavailable, or the file has changed: then the
+   * whole file must be requested again.
    */
   async resume(): Promise<boolean> {
     const from = Math.max(0, this.#body.length - OVERLAP);
     const [total, tag] = [this.#total, this.#tag];
     const isPart = from > 0 && total !== undefined && tag !== undefined;
     const isOwn = (globalThis.location?.origin ?? this.#address.origin) === this.#address.origin;
-    // Servers of other origins would be asked first whether they allow that header, and weak tags are not for it.
+    // Cross-origin that header would cause a preflight request, and it does not allow weak tags.
     const ifRange = isPart && isOwn && !tag.startsWith('W/') ? { 'If-Range': tag } : {};
     const headers = isPart ? { Range: `bytes=${from}-`, ...ifRange } : {};
     const response = await this.#request(headers).catch(() => undefined);
@@ -85,15 +87,15 @@ export class Download {
     return false;
   }
 
-  /** True if a partial answer begins where it ought to and ends where the file ends. */
+  /** Whether a partial response begins at the requested offset and ends at the end of the file. */
   #isRest(response: Response, from: number): boolean {
     const range = /^bytes (\d+)-(\d+)\/(\d+)$/.exec(response.headers.get('Content-Range') ?? '');
     if (range) return Number(range[1]) === from && Number(range[3]) === this.#total;
-    // Across origins that header is hidden from scripts, but the length is not.
+    // Cross-origin that header is hidden from scripts, but the length is not.
     return lengthOf(response) === (this.#total ?? 0) - from;
   }
 
-  /** Reads to the end of the connection. Throws `network/interrupted` if that is not the end of the file. */
+  /** Reads to the end of the connection. Throws `network/interrupted` if the file is incomplete. */
   async read(): Promise<void> {
     const { signal, onProgress, onArrival } = this.#options;
     const body = this.#body;
@@ -102,24 +104,24 @@ export class Download {
     for await (const value of this.#response ? chunksOf(this.#response, failed) : []) {
       const rest = this.#rest(value);
       if (rest === undefined) {
-        // Nothing of it is right: all is asked for again.
+        // The file has changed, so all of it is requested again.
         this.#tag = undefined;
         throw broken(new Error('another file than before'));
       }
       if (rest.length === 0) continue;
       this.#requireRoom(body.length + rest.length);
       body.append(rest);
-      // Across origins a Content-Encoding is hidden from scripts; a body longer than announced gives it away.
+      // Cross-origin the Content-Encoding is hidden from scripts; a body longer than declared reveals it.
       const total = this.#total !== undefined && body.length <= this.#total ? this.#total : undefined;
       onProgress?.(body.length, total);
       await onArrival?.(body.view(), total);
     }
-    // Some HTTP stacks end a broken connection without an error. Across origins the length may be that of an encoding.
+    // Some HTTP stacks end a broken connection without an error. Cross-origin the length may be that of an encoding.
     const isExact = this.#total !== undefined && this.#response?.type !== 'cors';
     if (isExact && body.length < this.#total!) throw broken(undefined);
   }
 
-  /** What of a chunk has not come before; undefined if what has come before was other bytes. */
+  /** Returns the new part of a chunk; undefined if the repeated part differs from the received bytes. */
   #rest(chunk: Uint8Array): Uint8Array | undefined {
     const known = this.#body.view().subarray(this.#at, this.#at + chunk.length);
     this.#at += chunk.length;
@@ -138,7 +140,7 @@ export class Download {
   }
 }
 
-/** True if a server of another origin answers requests whose answer nobody may read: then it is CORS that is missing. */
+/** Whether a server of another origin responds to requests whose response is opaque: then CORS headers are missing. */
 async function answersUnread(address: URL, signal: AbortSignal | undefined): Promise<boolean> {
   const page = globalThis.location?.origin;
   if (page === undefined || page === address.origin || !address.protocol.startsWith('http')) return false;
@@ -154,7 +156,7 @@ function discard({ body }: Response): Promise<void> {
   return body?.cancel().catch(() => {}) ?? Promise.resolve();
 }
 
-/** Length of the body in bytes if the headers tell it. */
+/** Length of the body in bytes, if the headers declare it. */
 function lengthOf({ headers }: Response): number | undefined {
   const encoding = headers.get('Content-Encoding');
   const length = headers.get('Content-Length');

@@ -1,8 +1,14 @@
-/** What readers say of a file: {@link damaged} ends the load, and {@link warn} tells what of the scene is not drawn. The reader of plain PLY loads none of it. */
+/**
+ * Faults of a file: {@link damaged} ends the load, and {@link warn} reports parts of the scene that are not drawn. The
+ * reader of plain PLY does not load this module.
+ */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { DraftCloud } from './cloud.js';
 
-/** The error for a file whose parts contradict one another. All arguments are phrases as `ErrorDetails` describes. */
+/**
+ * Returns the error for a file whose parts contradict one another. All arguments are phrases as `ErrorDetails`
+ * describes.
+ */
 export function damaged(
   where: string,
   expected: string,
@@ -17,15 +23,15 @@ export function damaged(
   return new GaussianSplatError(code, { where, expected, found, remedy, cause });
 }
 
-/** What is said where degree 4 is cut to 3. */
+/** Warning for degree 4, which is truncated to 3. */
 export const DEGREE_4 =
   'Spherical harmonics of degree 4 are drawn up to degree 3; the finest changes of colour with direction are left out.';
 
-/** What is said of 2D Gaussians. */
+/** Warning for 2D Gaussians. */
 export const FLAT =
   'The splats are 2D Gaussians (2DGS). They are drawn as flat 3D Gaussians: edges and thin parts look a little wider and paler than 2DGS draws them.';
 
-/** Adds a sentence about what is not drawn, once. */
+/** Adds a warning, once. */
 export function warn(cloud: DraftCloud, sentence: string): void {
   const { warnings = [] } = cloud;
   if (!warnings.includes(sentence)) cloud.warnings = [...warnings, sentence];

@@ -4,20 +4,21 @@ import { grouped, GrowingBytes } from './bytes.js';
 import { badStatus, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
-/** Some of the bytes of a file. */
+/** A range of bytes of a file. */
 export interface FetchedRange {
   readonly bytes: Uint8Array<ArrayBuffer>;
-  /** False of servers that send whole files only. */
+  /** False for servers that send whole files only. */
   readonly isPartial: boolean;
 }
 
 const RETRY_DELAY_MS = 250;
 
 /**
- * Downloads bytes `start` to `end` of a file by a range request. Of a server that sends the whole file these bytes are taken; what follows is not waited for. A connection that breaks off, and a server that has no time, are
- * tried again.
- * @returns fewer bytes where the file ends before
- * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`, `out-of-memory/budget`; the reason of `signal`
+ * Downloads bytes `start` to `end` of a file by a range request. If the server sends the whole file, the rest is
+ * discarded. Interrupted connections, and temporarily unavailable servers, are retried.
+ * @returns Fewer bytes if the file ends before.
+ * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`, `out-of-memory/budget`;
+ * the reason of `signal`.
  */
 export async function fetchRange(
   url: string,

@@ -9,45 +9,50 @@ import type { OpenPart } from './scene-format.js';
 
 /** `maxBytes` and `maxSeconds` end the download with `out-of-memory/budget`. */
 export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSeconds'> {
-  /** `cors` (default) or `same-origin`; answers to `no-cors` requests cannot be read. */
+  /** `cors` (default) or `same-origin`; responses to `no-cors` requests cannot be read. */
   readonly mode?: 'cors' | 'same-origin';
-  /** Which cookies are sent; default `same-origin`. */
+  /** Cookies policy; default `same-origin`. */
   readonly credentials?: RequestCredentials;
   /** Aborts the download; the promise then rejects with the signal's reason. */
   readonly signal?: AbortSignal;
   /**
-   * Called after every chunk with the bytes until now. The total is undefined where the server does not say it or says
-   * the length of a compressed transfer, which is another number than that of the bytes that arrive.
+   * Called after every chunk with the number of received bytes. The total is undefined if the server does not declare
+   * it or declares the length of a compressed transfer.
    */
   readonly onProgress?: (loadedBytes: number, totalBytes: number | undefined) => void;
   /**
-   * Called after every chunk with all bytes until now, which stay as they are, and the total as above. The download goes on when the
-   * promise fulfils. A server that cannot go on where a connection broke begins again, and so do these bytes.
+   * Called after every chunk with all received bytes, which never change, and the total as above. The download
+   * continues when the promise resolves. If a server cannot resume an interrupted download, these bytes start again.
    */
   readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;
-  /** How often in a row, without getting farther by 64 KiB, a download that broke off is taken up again, where it stopped if the server can do that; default 3. */
+  /**
+   * Maximum number of consecutive resumptions of an interrupted download without progress of 64 KiB; it continues at
+   * the same byte if the server supports that. Default 3.
+   */
   readonly retries?: number;
 }
 
-/** Pause before a download is taken up again the first time, ms; it doubles each time. */
+/** Pause before the first resumption, ms; it doubles each time. */
 const RETRY_DELAY_MS = 250;
-/** Bytes by which a download has got farther: a connection for each byte is no way to load a file. */
+/** Minimum progress in bytes, so that a file is not loaded with a connection for each byte. */
 const LEAST_PROGRESS = 65_536;
 
 /**
- * Downloads a file with true progress. A connection that breaks off, or on which less than 1 KiB comes in 30 s, is taken up again where it stopped, by a range request, if the server tells
- * (ETag, Last-Modified) that the file is still the same; otherwise all of it is asked for again. A server that has no time (429, 503; 5xx once it had begun) is asked again after a while, one
- * that does not answer within 30 s is given up.
+ * Downloads a file with exact progress. A connection that is interrupted, or that transfers less than 1 KiB in 30 s, is
+ * resumed at the same byte by a range request, if a validator (ETag, Last-Modified) shows that the file is unchanged;
+ * otherwise the whole file is requested again. A temporarily unavailable server (429, 503; also 5xx after the first
+ * bytes) is retried after a pause; one that does not respond within 30 s is abandoned.
  *
- * @param url absolute, or relative to the page or worker script (which in a worker made from a blob has no address:
+ * @param url Absolute, or relative to the page or worker script (a worker created from a blob has no base address:
  * resolve the URL before).
  * @throws GaussianSplatError `network/url`, `network/unreachable` (no server, offline, CORS, mixed content),
- * `network/status`, `network/interrupted`, `out-of-memory/budget` or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError.
+ * `network/status`, `network/interrupted`, `out-of-memory/budget` or `out-of-memory/allocation`; the reason of
+ * `signal`, usually a DOMException named AbortError.
  */
 export async function fetchScene(url: string | URL, options: FetchSceneOptions = {}): Promise<Uint8Array> {
   const address = parseUrl(url);
   const { signal, maxSeconds = Infinity } = options;
-  // Timers end at 2^31 ms.
+  // Timers are limited to 2^31 ms.
   const limit = maxSeconds < 2e6 ? AbortSignal.timeout(1000 * Math.max(0, maxSeconds)) : undefined;
   const signals = [signal, limit].filter((each) => each !== undefined);
   const either = signals.length > 1 ? AbortSignal.any(signals) : signals[0];
@@ -62,7 +67,7 @@ export async function fetchScene(url: string | URL, options: FetchSceneOptions =
 
 async function bring(download: Download, signal: AbortSignal | undefined, retries = 3): Promise<Uint8Array> {
   let [tries, farthest] = [0, 0];
-  /** Waits before another try; throws what went wrong once there have been enough. */
+  /** Waits before a retry; throws the error once the retries are used up. */
   const pause = async (error: unknown): Promise<void> => {
     if (tries >= retries) throw error;
     await delay(RETRY_DELAY_MS * 2 ** tries++, signal);
@@ -77,7 +82,7 @@ async function bring(download: Download, signal: AbortSignal | undefined, retrie
       if (!(error instanceof GaussianSplatError) || error.code !== 'network/interrupted') throw error;
       const { length } = download.bytes;
       if (length >= farthest + LEAST_PROGRESS) [tries, farthest] = [0, length];
-      // Whatever goes wrong now, what is to be told is that the connection broke.
+      // Any further error is reported as the interrupted connection.
       do await pause(error);
       while (!(await download.resume()));
     }
@@ -89,7 +94,7 @@ function parseUrl(url: string | URL): URL {
   const refuse = (shown: string, found: string, cause?: unknown): never => {
     throw new GaussianSplatError('network/url', {
       where: `address ${quote(shown, 200)}`,
-      // In a worker the base is that of the worker's script, which nobody who reads this has written.
+      // In a worker the base is the worker's script, which is meaningless to the user.
       expected: base ? 'an absolute URL or a relative one' : 'an absolute URL',
       found,
       remedy: 'correct the address of the scene',
@@ -102,14 +107,14 @@ function parseUrl(url: string | URL): URL {
   } catch (cause) {
     return refuse(String(url), 'text that is none', cause);
   }
-  // Browsers refuse such requests in words that repeat the password.
+  // Browsers reject such requests with messages that repeat the password.
   const { username, password, host, pathname } = address;
   return username || password
     ? refuse(host + pathname, 'one with a user name or password, which browsers refuse')
     : address;
 }
 
-/** Waits, or rejects with the signal's reason. */
+/** Waits; rejects with the reason of the signal. */
 function delay(ms: number, signal: AbortSignal | undefined): Promise<void> {
   return new Promise((resolve, reject) => {
     const give = (): void => {
@@ -125,19 +130,22 @@ function delay(ms: number, signal: AbortSignal | undefined): Promise<void> {
 }
 
 /**
- * A way to the other files of the scene at an address, for `ReadSceneOptions.openPart`: each is fetched from beside it with the
- * same options, and with the scene's query unless the scene gives it one of its own.
+ * Returns an opener for the other files of a scene, for `ReadSceneOptions.openFile`: each is fetched relative to the
+ * scene with the same options, and with the scene's query unless it has its own.
  *
- * @param url absolute address of the scene's own file.
- * @param optionsOf options for each part, by its path.
+ * @param url Absolute address of the scene's own file.
+ * @param optionsOf Options for each file, by its path.
  */
 export function openPartAt(url: string | URL, optionsOf: (path: string) => FetchSceneOptions): OpenPart {
   return (path, query) => fetchScene(partAddress(url, path, query), optionsOf(path));
 }
 
-/** Address of another file of the scene at an address. Every part of the path is encoded, so that it can be no address of another server. */
+/**
+ * Returns the address of another file of a scene. Every segment of the path is encoded, so that it cannot address
+ * another server.
+ */
 export function partAddress(url: string | URL, path: string, query = ''): URL {
-  // Two slashes would begin the name of a server.
+  // Two slashes would start a server name.
   const encoded = path
     .replace(/^\/+/, '/')
     .split('/')

@@ -1,12 +1,15 @@
 import { asciiOf, startsWith } from './bytes.js';
 import { loadDiagnosis } from './load-parts.js';
 
-/** Tells a kind of file by its bytes, or by its first words. */
+/** Recognizes a kind of file by its bytes, or by its first words. */
 type Fits = (bytes: Uint8Array, text: string) => boolean;
 
 const isJson: Fits = (_, text) => /^\s*(\{\s*("|\}|$)|\[\s*(["\d[{\]-]|$))/.test(text);
 
-/** Kinds of files with a signature that no scene format shares; the first that fits wins. What is said of them is in diagnose.ts, which only failures load. */
+/**
+ * Kinds of files with a signature that no scene format shares; the first match wins. Their messages are in diagnose.ts,
+ * which only failures load.
+ */
 const SIGNATURES = {
   lfsPointer: (_, text) => text.startsWith('version https://git-lfs.github.com/spec/'),
   html: (_, text) => /^\s*(<!--[^]*?-->\s*)*<(!doctype\s+html|html|head|body|script|title)\b/i.test(text),
@@ -25,7 +28,7 @@ const SIGNATURES = {
 
 export type ForeignName = keyof typeof SIGNATURES;
 
-/** What a file with the signature of something else than a scene is; undefined for all others. */
+/** Returns the kind of a file with a signature other than that of a scene; undefined for all others. */
 export function foreignName(bytes: Uint8Array): ForeignName | undefined {
   const text = sampleText(bytes);
   const names = Object.keys(SIGNATURES) as ForeignName[];
@@ -36,13 +39,14 @@ const SAMPLE_BYTES = 1024;
 
 /** The first words of a file. */
 export function sampleText(bytes: Uint8Array): string {
-  // A byte-order mark is three such characters.
+  // A byte-order mark takes three such characters.
   return asciiOf(bytes, 0, SAMPLE_BYTES).replace(/^\u00ef\u00bb\u00bf/, '');
 }
 
 /**
- * A file that a scene names, unless it is what servers send in place of one that is missing: a page, or the pointer of a file that git LFS never fetched.
- * @param name what error messages call it
+ * Returns a file that a scene names, unless it is a server's substitute for a missing one: a web page, or the pointer
+ * of a file that git LFS never downloaded.
+ * @param name Name of the file in error messages.
  * @throws GaussianSplatError `decode/html`, `decode/lfs-pointer`
  */
 export async function checkedPart(bytes: Uint8Array, name: string): Promise<Uint8Array> {

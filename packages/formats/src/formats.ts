@@ -2,10 +2,10 @@ import { startsWith } from './bytes.js';
 import type { SceneFormat } from './scene-format.js';
 import { isCompressedPly, isGltf, isGzip, isLodMeta, isNgsp, isPly, isSogMeta, isZip } from './signatures.js';
 
-/** What is known of a format without its names. */
+/** A format without its names. */
 export type UsualFormat = Omit<SceneFormat, 'extensions' | 'mimeTypes'>;
 
-/** The formats that most pages have; the first whose signature fits wins. Those of late-formats.ts are loaded for files that are none of them. */
+/** The formats of most pages; the first matching signature wins. Those of late-formats.ts are loaded for other files. */
 export const usualFormats: readonly UsualFormat[] = [
   {
     name: 'compressed-ply',
@@ -25,7 +25,7 @@ export const usualFormats: readonly UsualFormat[] = [
     name: 'spz',
     readsPrefix: true,
     title: 'SPZ (Niantic)',
-    // Versions 1 to 3 are gzip files; what else may be inside is the reader's to say.
+    // Versions 1 to 3 are gzip files; the reader checks their content.
     hasSignature: (bytes) => isNgsp(bytes) || isGzip(bytes),
     load: async () => (await import('./readers/spz.js')).readSpz,
   },
@@ -55,6 +55,6 @@ export const usualFormats: readonly UsualFormat[] = [
   },
 ];
 
-/** The usual format that the first bytes of a file prove; undefined for all others. */
+/** Returns the common format whose signature the first bytes have; undefined for all others. */
 export const signedFormat = (bytes: Uint8Array): UsualFormat | undefined =>
   usualFormats.find(({ hasSignature }) => hasSignature?.(bytes));

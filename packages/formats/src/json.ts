@@ -4,13 +4,13 @@ import type { SceneSource } from './scene-format.js';
 
 export type Json = Record<string, unknown>;
 
-/** A file, or a part of one, that is JSON. */
+/** A JSON file, or a JSON section of one. */
 export type JsonSource = Pick<SceneSource, 'bytes' | 'name' | 'budget'>;
 
-/** What the values of JSON take in memory: lists of empty lists the most. */
+/** Memory of a JSON value for each character: nested empty arrays take the most. */
 const BYTES_PER_CHARACTER = 16;
 
-/** Parses JSON of a scene. Throws `decode/corrupt` with the position that the parser names. */
+/** Parses the JSON of a scene. Throws `decode/corrupt` with the position that the parser reports. */
 export function parseJson({ bytes, name, budget }: JsonSource, maxBytes: number): Json {
   if (bytes.length > maxBytes) {
     throw damaged(name, `a description of at most ${grouped(maxBytes)} bytes`, grouped(bytes.length));
@@ -38,13 +38,13 @@ export function isObject(value: unknown): value is Json {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
 
-/** A JSON value for error messages. */
+/** Formats a JSON value for error messages. */
 export function show(value: unknown): string {
   if (value === undefined) return 'nothing';
   try {
     return quote(typeof value === 'string' ? value : (JSON.stringify(value) ?? String(value)), 80);
   } catch {
-    // Lists within lists, more than calls can be within calls.
+    // Nested arrays may be deeper than the call stack.
     return Array.isArray(value) ? 'a deep list' : 'a deep object';
   }
 }

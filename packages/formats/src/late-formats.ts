@@ -1,4 +1,4 @@
-/** Formats that few pages have, and those that their names tell: loaded for files that are none of the usual ones. */
+/** Rare formats, and formats that are recognized by their names: loaded for files without a common signature. */
 import { usualFormats } from './formats.js';
 import type { SceneFormat } from './scene-format.js';
 import { isRad, looksLikeKsplat } from './signatures.js';
@@ -32,7 +32,7 @@ const lateFormats: readonly SceneFormat[] = [
   },
 ];
 
-/** Names of the usual formats, which their content tells. */
+/** Names of the common formats, which are recognized by their content. */
 const NAMES: Partial<Record<SceneFormat['name'], Pick<SceneFormat, 'extensions' | 'mimeTypes'>>> = {
   'compressed-ply': { extensions: ['.compressed.ply', '.ply'], mimeTypes: [] },
   ply: { extensions: ['.ply'], mimeTypes: ['model/ply', 'application/ply', 'application/x-ply'] },
@@ -43,7 +43,7 @@ const NAMES: Partial<Record<SceneFormat['name'], Pick<SceneFormat, 'extensions' 
   gltf: { extensions: ['.glb', '.gltf'], mimeTypes: ['model/gltf-binary', 'model/gltf+json'] },
 };
 
-/** All formats that `readScene` reads; the first whose signature fits wins. */
+/** All formats of `readScene`; the first matching signature wins. */
 export const sceneFormats: readonly SceneFormat[] = [
   ...usualFormats.map((format) => ({ extensions: [], mimeTypes: [], ...NAMES[format.name], ...format })),
   ...lateFormats,

@@ -1,14 +1,14 @@
-/** Loaded where much of a file cannot be drawn. */
+/** Loaded if many splats of a file cannot be drawn. */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 import { reasonsOf } from './scene-errors.js';
 
-/** Of fewer than so many hundredths of the file's splats nobody can tell what the scene was. */
+/** Minimum percentage of drawable splats; with fewer, the scene is unrecognizable. */
 const LEAST_PERCENT = 10;
 
 /**
- * The cloud with a warning of what it lacks.
- * @throws GaussianSplatError `decode/corrupt` where next to nothing is left
+ * Returns the cloud with a warning about its dropped splats.
+ * @throws GaussianSplatError `decode/corrupt` if almost nothing is left.
  */
 export function withLeftOut(cloud: GaussianCloud, name: string): GaussianCloud {
   const { count, droppedCount, faults = [], warnings = [] } = cloud;

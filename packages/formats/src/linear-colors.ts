@@ -1,21 +1,22 @@
-/** Colors that a file gives as linear light. */
+/** Files with linear colors. */
 import { shCoefficientCount } from '@gaussian-splat/core';
 import { SH_C0, type DraftCloud } from './cloud.js';
 import { warn } from './faults.js';
 
-/** The sRGB transfer function, continued to negative values as an odd function. */
+/** The sRGB transfer function, extended to negative values as an odd function. */
 function encoded(linear: number): number {
   const size = Math.abs(linear);
   const value = size <= 0.0031308 ? 12.92 * size : 1.055 * size ** (1 / 2.4) - 0.055;
   return linear < 0 ? -value : value;
 }
 
-/** A deviation below this has the slope of the curve itself. */
+/** Smaller deviations use the slope of the curve itself. */
 const LEAST_DEVIATION = 1e-4;
 
 /**
- * Encodes linear colors as sRGB, in place. The mean color of a splat is exact; its change with direction is multiplied by the slope of the curve over the standard
- * deviation of that change. Blending encoded colors in place of linear ones is an approximation, which the cloud's warning says.
+ * Encodes linear colors as sRGB, in place. The mean color of a splat is exact; its change with direction is multiplied
+ * by the slope of the curve over the standard deviation of that change. Blending encoded instead of linear colors is an
+ * approximation, as the cloud's warning states.
  */
 export function encodeLinearColors(cloud: DraftCloud, source: string): void {
   const { count, sh, shDegree } = cloud;
@@ -28,7 +29,7 @@ export function encodeLinearColors(cloud: DraftCloud, source: string): void {
       for (let k = 3; k < stride; k += 3) squares += sh[at + k] ** 2;
       sh[at] = (encoded(linear) - 0.5) / SH_C0;
       if (squares === 0) continue;
-      // Basis functions are orthonormal: the mean of the square over all directions is the sum of squares by 4π.
+      // The basis is orthonormal, so the mean square over all directions is the sum of squares divided by 4π.
       const deviation = Math.max(LEAST_DEVIATION, Math.sqrt(squares / (4 * Math.PI)));
       const slope = (encoded(linear + deviation) - encoded(linear - deviation)) / (2 * deviation);
       for (let k = 3; k < stride; k += 3) sh[at + k] *= slope;

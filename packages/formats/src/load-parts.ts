@@ -5,23 +5,23 @@ import type * as leftOut from './left-out.js';
 import type * as previews from './preview.js';
 import type { SceneFormat, SceneReader } from './scene-format.js';
 
-/** The parts of this package that are loaded when they are first needed. All throw GaussianSplatError `network/unreachable`. */
+/** Modules of this package that are loaded on demand. All throw GaussianSplatError `network/unreachable`. */
 
 export const loadReader = ({ title, load }: Pick<SceneFormat, 'title' | 'load'>): Promise<SceneReader> =>
   loadModule(`the code that reads ${title}`, load);
 
-/** What knows files that are no scene. */
+/** Identifies files that are not scenes. */
 export const loadDiagnosis = (): Promise<typeof diagnosis> =>
   loadModule('the code for other files', () => import('./diagnose.js'));
 
-/** What knows formats without a signature. */
+/** Detects formats without a signature. */
 export const loadDetection = (): Promise<typeof detection> =>
   loadModule('the code that tells formats by their names', () => import('./detect.js'));
 
-/** What makes previews of scenes that are there. */
+/** Creates previews of loaded scenes. */
 export const loadPreviews = (): Promise<typeof previews> =>
   loadModule('the code that makes previews', () => import('./preview.js'));
 
-/** What says how much of a file cannot be drawn. */
+/** Reports dropped splats. */
 export const loadLeftOut = (): Promise<typeof leftOut> =>
   loadModule('the code of warnings', () => import('./left-out.js'));

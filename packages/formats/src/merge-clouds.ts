@@ -10,7 +10,10 @@ export interface CloudPart {
   readonly count: number;
 }
 
-/** One cloud of parts of several, of the highest degree of them; lower degrees get zeros. All have the origin of the largest. */
+/**
+ * Merges parts of several clouds, with the highest degree of them; lower degrees are padded with zeros. The origin is
+ * that of the largest.
+ */
 export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSource, 'budget' | 'name'>): DraftCloud {
   const count = parts.reduce((sum, part) => sum + part.count, 0);
   const degree = parts.reduce<ShDegree>((most, { cloud }) => (cloud.shDegree > most ? cloud.shDegree : most), 0);
@@ -52,10 +55,10 @@ function copyPart({ cloud, first, count }: CloudPart, to: DraftCloud, at: number
   }
 }
 
-/** Part of a cloud, and what it shows: a node of the scene at a level. */
+/** Part of a cloud, with its node of the scene and its level. */
 export type NodePart = CloudPart & Pick<LevelRun, 'node' | 'level'>;
 
-/** Where the parts lie once they are merged. */
+/** Locations of the parts in the merged cloud. */
 export function levelRunsOf(parts: readonly NodePart[]): LevelRun[] {
   let first = 0;
   return parts.map(({ count, node, level }) => {

@@ -5,50 +5,50 @@ import { checkedPart } from './foreign-signatures.js';
 import { damaged } from './faults.js';
 import { noSplats } from './scene-errors.js';
 
-/** What may change from frame to frame, in the order of files, and how many numbers of a splat it is. */
+/** Animated attributes, in the order of files, and their numbers for each splat. */
 export const MOVING = { position: 3, rotation: 3, scale: 3, opacity: 1, color: 3 } as const;
 export type MovingName = keyof typeof MOVING;
 export const MOVING_NAMES = Object.keys(MOVING) as readonly MovingName[];
 
-/** Of files whose splats are all there in every frame, and of those that say of each splat in which frames it is. */
+/** Versions of files: all splats exist in every frame, or each splat has a lifetime. */
 export const MOTION_VERSION = { everywhere: 1, lives: 2 } as const;
 type MotionVersion = (typeof MOTION_VERSION)[keyof typeof MOTION_VERSION];
-/** Version, splats, frames; a rank and a step for each of {@link MOVING}. */
+/** Version, splats, frames; a rank and a step for each of {@link ANIMATED_ATTRIBUTES}. */
 const HEAD_BYTES = 4 * (3 + 2 * MOVING_NAMES.length);
-/** Compressed bytes handed over at once, see Gunzip. */
+/** Compressed bytes fed in one step, see Gunzip. */
 const FEED_BYTES = 16_384;
-/** How codes are written: as they are, or by what each adds to the one before. */
+/** Coding of codes: plain, or as differences from the previous one. */
 export const MOTION_MODES = { plain: 0, differences: 1 } as const;
-/** Curves are of length 1 a frame, or about. */
+/** Limit of curve values; curves have a length of about 1 for each frame. */
 const MOST_CURVE = 1e6;
 
-/** How one attribute changes: at frame f by step · Σ_k curves[f, k] · codes[number, k]. */
+/** Motion of one attribute: at frame f it changes by step · Σ_k curves[f, k] · codes[number, k]. */
 export interface MovingPart {
-  /** Curves that all splats share; 0: the attribute does not change. */
+  /** Number of curves, which all splats share; 0: the attribute does not change. */
   readonly rank: number;
   readonly step: number;
   /** [frames, rank] */
   readonly curves: Float32Array;
-  /** [width, rank] of [splats]: how much of a curve a number of each splat follows. */
+  /** [width, rank] of [splats]: weight of each curve for each number of a splat. */
   readonly codes: readonly Int16Array[];
 }
 
-/** Frames that each splat is in: those from `first` on, before `end`. */
+/** Lifetime of each splat: frames from `first` on, before `end`. */
 export interface Lives {
   readonly first: Uint16Array;
   readonly end: Uint16Array;
 }
 
-/** What some frames of a sequence differ by from the first. */
+/** Differences of some frames of a sequence from the first. */
 export interface Motion {
   readonly splats: number;
   readonly frames: number;
   readonly parts: Readonly<Record<MovingName, MovingPart>>;
-  /** Undefined: every splat is in all frames. */
+  /** Undefined: every splat exists in all frames. */
   readonly lives?: Lives;
 }
 
-/** What a file must fit: splats of the first frame, and frames that the manifest gives it. */
+/** A file of motion and its required dimensions: splats of the first frame, and frames according to the manifest. */
 export interface MotionFile {
   readonly bytes: Uint8Array;
   readonly name: string;
@@ -69,11 +69,11 @@ export async function readMotion({ bytes, name, ...asked }: MotionFile): Promise
 
 type Asked = Pick<MotionFile, 'splats' | 'frames' | 'budget' | 'version'>;
 
-/** Inflates a file, of whose head all else follows: no more than that is held. */
+/** Inflates a file, and stops at the size that its header implies. */
 async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<Uint8Array> {
   const { readable, writable } = new DecompressionStream('deflate-raw');
   const reader = readable.getReader();
-  // Errors of the stream come through the reader.
+  // Errors of the stream are reported by the reader.
   feed(writable.getWriter(), bytes).catch(() => {});
   const output = new GrowingBytes(65_536);
   let length: number | undefined;
@@ -86,7 +86,7 @@ async function inflate(bytes: Uint8Array, name: string, asked: Asked): Promise<U
       output.append(value);
       if (length === undefined && output.length >= HEAD_BYTES) {
         length = lengthFrom(output.view(), name, asked);
-        // What grows is there twice while it is copied.
+        // A growing buffer exists twice while it is copied.
         asked.budget.take(2 * length, name);
       }
       if (length !== undefined && output.length > length) throw wrongLength(name, length, 'more');
@@ -108,7 +108,7 @@ const wrongLength = (name: string, expected: number, found: string): GaussianSpl
 
 const rankAt = (view: DataView, k: number): number => view.getUint32(12 + 8 * k, true);
 
-/** Bytes that a file inflates to, by its head. */
+/** Inflated size of a file, from its header. */
 function lengthFrom(
   head: Uint8Array,
   name: string,
@@ -209,10 +209,10 @@ class MotionReader {
 }
 
 /**
- * The splats of a frame. The first frame is left as it is.
- * @param frame 0 is the first that the motion is of
- * @param budget is charged for them
- * @throws GaussianSplatError `decode/empty` if none of them can be drawn, `out-of-memory/budget`
+ * Returns the splats of a frame. The first frame is not modified.
+ * @param frame Index; 0 is the first frame of the motion.
+ * @param budget Is charged for them.
+ * @throws GaussianSplatError `decode/empty` if no splat is drawable, `out-of-memory/budget`
  */
 export function movedCloud(
   first: GaussianCloud,
@@ -266,7 +266,7 @@ export function movedCloud(
 
 const isAlive = ({ first, end }: Lives, i: number, frame: number): boolean => frame >= first[i] && frame < end[i];
 
-/** Curves say nothing of splats that are not there: they stay where they were written, and are not seen. */
+/** Curves do not apply to splats outside their lifetime: these keep their position with opacity 0. */
 function hide(cloud: GaussianCloud, first: GaussianCloud, i: number): void {
   cloud.opacities[i] = 0;
   cloud.positions.set(first.positions.subarray(3 * i, 3 * i + 3), 3 * i);
@@ -274,7 +274,7 @@ function hide(cloud: GaussianCloud, first: GaussianCloud, i: number): void {
   cloud.rotations.set(first.rotations.subarray(4 * i, 4 * i + 4), 4 * i);
 }
 
-/** Turns quaternions further, about axes as long as the angles. */
+/** Rotates quaternions by rotation vectors, whose length is the angle. */
 function turnBy(rotations: Float32Array, turns: Float32Array): void {
   for (let i = 0; i < turns.length / 3; i++) {
     const [x, y, z] = [turns[3 * i], turns[3 * i + 1], turns[3 * i + 2]];

@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 
-/** What is said when a file does not come. */
+/** Errors of failed downloads. */
 
 export function unreachable(address: URL, cause: unknown): GaussianSplatError {
   return new GaussianSplatError('network/unreachable', {
@@ -59,7 +59,7 @@ export function interrupted(
   });
 }
 
-/** The address for messages, short where it carries its data along. */
+/** Formats an address for messages, truncated for data URLs. */
 export function label({ href }: URL): string {
   return href.length > 200 ? `${href.slice(0, 200)}...` : href;
 }

@@ -1,8 +1,8 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
-/** A preview has every so many-th splat. */
+/** A preview contains one splat of this many. */
 export const PREVIEW_STEP = 16;
-/** Every n-th splat of a cloud, without coefficients above the constant one, larger to stand for the rest. */
+/** Returns every n-th splat of a cloud, without coefficients above the constant one, enlarged to represent the rest. */
 export function samplePreview(cloud: GaussianCloud): GaussianCloud {
   const count = Math.ceil(cloud.count / PREVIEW_STEP);
   const take = (values: Float32Array, stride: number, size: number): Float32Array => {
@@ -26,8 +26,8 @@ export function samplePreview(cloud: GaussianCloud): GaussianCloud {
 }
 
 /**
- * Makes a selection stand for the whole: `kept` of `all` splats, each larger by the square root of what it stands for, so that they
- * cover the same area. Works in place.
+ * Enlarges a selection of splats to represent the whole: each by the square root of the number that it represents, so
+ * that they cover the same area. Works in place.
  */
 export function sparse<T extends GaussianCloud>(cloud: T, share = 1 / PREVIEW_STEP): T {
   const factor = Math.sqrt(1 / share);

@@ -6,12 +6,12 @@ import { loadReader } from './load-parts.js';
 import type { ReadSceneOptions } from './read-scene.js';
 
 /**
- * Reads what can be seen of a file that is still arriving: the splats that are whole (PLY, compressed PLY, .splat, .ksplat), or all splats
- * without their view-dependent colours once these are all that is missing (SPZ, compressed PLY).
+ * Reads the available splats of a file that is still loading: complete splats (PLY, compressed PLY, .splat, .ksplat),
+ * or all splats without their view-dependent colors once only these are missing (SPZ, compressed PLY).
  *
- * @param beginning the first bytes of the file.
- * @returns the splats in the order of the file, or undefined if there are none yet or the format cannot be read in part. Never throws for
- * what the bytes are: `readScene` says what is wrong once the file is whole.
+ * @param beginning The first bytes of the file.
+ * @returns The splats in the order of the file, or undefined if there are none yet or the format cannot be read in
+ * part. Never throws for invalid bytes: `readScene` reports them once the file is complete.
  */
 export async function readPrefix(
   beginning: FileBytes,

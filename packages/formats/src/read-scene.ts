@@ -6,41 +6,49 @@ import { loadDetection, loadDiagnosis, loadLeftOut, loadPreviews, loadReader } f
 import { emptyFile, noSplats, outOfMemory } from './scene-errors.js';
 import { previewWanted, type OpenPart, type SceneSource } from './scene-format.js';
 
-/** Share of a file's splats that may be left out without a word. */
+/** Maximum fraction of a file's splats that may be dropped without a warning. */
 export const MOST_DROPPED = 0.05;
 
 export interface ReadSceneOptions extends LoadLimits {
-  /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
+  /** File name or URL: used in error messages, and its extension identifies formats without a signature. */
   readonly name?: string;
-  /** Media type that the server sent. */
+  /** Media type from the server. */
   readonly contentType?: string;
   /** Aborts between the steps of reading; the promise then rejects with the signal's reason. */
   readonly signal?: AbortSignal;
   /**
-   * Opens the other files of a scene of several files (SOG folders, streamed SOG, glTF with buffers of their own); `openPartAt` makes one
-   * for an address. Archives need none.
+   * Opens the other files of a scene of several files (SOG folders, streamed SOG, glTF with external buffers);
+   * `fileOpenerFor` returns one for an address. Archives need none.
    */
   readonly openPart?: OpenPart;
-  /** Level of detail that is read of a streamed scene, 0 (default) the finest; `all` reads all of them, for renderers that choose: see `GaussianCloud.levelRuns`. */
+  /**
+   * Level of detail of a streamed scene to read, 0 (default) is the finest; `all` reads all of them, for renderers that
+   * select: see `GaussianCloud.levelRuns`.
+   */
   readonly level?: number | 'all';
-  /** Splats of the finest level that is read of streamed SOG, at most; where all levels have more, the coarsest is read. */
+  /**
+   * Upper limit of splats for streamed SOG: the finest level within it is read; if all levels have more, the coarsest.
+   */
   readonly mostSplats?: number;
   /**
-   * Called, if the scene is large and its format allows, with some of its splats, spread over all of it and larger to stand
-   * for the rest, before the whole is read. Reading goes on once the promise fulfils.
+   * Called with a preview before the whole scene is read, if it is large and its format allows: some of its splats,
+   * spread over all of it and enlarged to represent the rest. Reading continues once the promise resolves.
    */
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
 
 /**
- * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4, SOG version 1 and 2, streamed SOG, glTF with
- * `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is recognized by the content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
+ * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4, SOG version 1 and 2, streamed SOG, glTF
+ * with `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is detected from the
+ * content. Works in windows, workers and Node; the reader of the format is loaded on demand.
  *
- * @param file the whole file. It is not changed, and the cloud does not refer to it.
- * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn
- * are left out and counted in `droppedCount`; `warnings` says what else of the file is not drawn.
- * @throws GaussianSplatError with a `decode/...` code that says what was expected and found, where and what to do,
- * `argument/value` for what are no bytes, `out-of-memory/budget` for what asks for more than its bytes or the limits in `options` allow, or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
+ * @param file The whole file. It is not changed, and the cloud does not refer to it.
+ * @returns The splats in the structure and coordinates that `GaussianCloud` documents. Unusable splats are dropped and
+ * counted in `droppedCount`; `warnings` reports other content that is not drawn.
+ * @throws GaussianSplatError with a `decode/...` code that states the expected and found content, the place and a
+ * remedy, `argument/value` for an argument without bytes, `out-of-memory/budget` for a file that needs more than its
+ * bytes or the limits in `options` allow, or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException
+ * named AbortError, once it is aborted.
  */
 export async function readScene(file: FileBytes, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
   const { name = 'scene', contentType = '', signal, openPart, level, mostSplats, onPreview } = options;
@@ -70,7 +78,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
     openPart &&
     (async (path: string, query = '') => {
       const part = plainBytes(await openPart(path, query || undefined), path);
-      // The same file again is no other.
+      // A repeated file is charged once.
       if (!known.has(path + query)) budget.arrive(part.length);
       known.add(path + query);
       return part;
@@ -83,7 +91,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
     throw outOfMemory(error, name) ?? error;
   });
   signal?.throwIfAborted();
-  // Checking and packing all splats takes longer than reading them, so that a preview is worth its while even now.
+  // Validating and packing all splats takes longer than reading them, so a preview is worthwhile even now.
   if (!hasPreview && previewWanted(source, whole.count)) {
     const { samplePreview } = await loadPreviews();
     await preview(samplePreview(whole));

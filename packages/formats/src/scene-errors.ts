@@ -1,8 +1,8 @@
-/** Errors of whole scenes, of any format. */
+/** Errors of whole scenes, independent of the format. */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 
-/** The error for a file without a byte. */
+/** The error for an empty file. */
 export function emptyFile(name: string): GaussianSplatError {
   return new GaussianSplatError('decode/empty', {
     where: `${name}, byte 0`,
@@ -15,11 +15,11 @@ export function emptyFile(name: string): GaussianSplatError {
 /** Reasons of {@link GaussianCloud.faults}, in their order. */
 const FAULTS = ['a scale below 0', 'no rotation', 'no extent', 'values that are not finite or too large'];
 
-/** The counted reasons why splats of a cloud cannot be drawn. */
+/** Formats the counts of the reasons that splats of a cloud cannot be drawn. */
 export const reasonsOf = (faults: readonly number[]): string =>
   FAULTS.flatMap((fault, k) => (faults[k] > 0 ? [`${grouped(faults[k])} with ${fault}`] : [])).join(', ');
 
-/** The error for a scene of which nothing can be drawn. */
+/** The error for a scene without drawable splats. */
 export function noSplats(name: string, { droppedCount, faults = [] }: GaussianCloud): GaussianSplatError {
   return new GaussianSplatError('decode/empty', {
     where: name,
@@ -33,7 +33,7 @@ export function noSplats(name: string, { droppedCount, faults = [] }: GaussianCl
   });
 }
 
-/** The error for memory that could not be had; undefined for errors of other kinds. */
+/** Converts a failed allocation to an error; undefined for other errors. */
 export function outOfMemory(error: unknown, where: string): GaussianSplatError | undefined {
   if (!(error instanceof RangeError)) return undefined;
   return new GaussianSplatError('out-of-memory/allocation', {

@@ -1,42 +1,42 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { LoadBudget } from './budget.js';
 
-/** Splats `first` to `end`, the latter not included, in the order of the file. */
+/** Splats `first` to `end`, excluding the latter, in the order of the file. */
 export interface SplatRange {
   readonly first: number;
   readonly end: number;
 }
 
-/** One scene file in memory, as readers get it. */
+/** One scene file in memory, as the input of readers. */
 export interface SceneSource {
-  /** The whole file, as the server or disk gave it. */
+  /** The whole file, as downloaded or read. */
   readonly bytes: Uint8Array;
-  /** What error messages call the file: its name or URL. */
+  /** Name in error messages: the file name or URL. */
   readonly name: string;
-  /** The account of the load: charged before anything is allocated that is not as long as what is at hand. */
+  /** Account of the load: charged before any allocation that is larger than the available bytes. */
   readonly budget: LoadBudget;
-  /** Readers that wait or work long call `throwIfAborted()` between steps. */
+  /** Asynchronous or long-running readers call `throwIfAborted()` between steps. */
   readonly signal?: AbortSignal;
-  /** True if `bytes` are only the first of the file: the splats that are whole are read, attributes that are missing left out. */
+  /** Whether `bytes` are only the beginning of the file: complete splats are read, missing attributes skipped. */
   readonly isPrefix?: boolean;
-  /** Only these splats are wanted; readers that cannot leave the others out do not know it. See `splatRanges`. */
+  /** Range of splats to read; ignored by readers without support for ranges. See `splatRanges`. */
   readonly range?: SplatRange;
-  /** True for an SPZ that a glTF holds: its frame is the one of SPZ's specification. */
+  /** Whether the SPZ is embedded in a glTF: its coordinates are then those of SPZ's specification. */
   readonly isWithinGltf?: boolean;
-  /** Opens the files that a scene of several files names; absent where there is only the one. */
+  /** Opens the other files of a scene of several files; absent for a single file. */
   readonly openPart?: OpenPart;
-  /** Which level of a scene with levels of detail is read: 0 is the finest. `all`: all of them, in the runs that `GaussianCloud.levelRuns` tells. */
+  /** Level of detail to read: 0 is the finest. `all`: all of them, in the runs of `GaussianCloud.levelRuns`. */
   readonly level?: number | 'all';
   /** See `ReadSceneOptions.mostSplats`. */
   readonly mostSplats?: number | undefined;
-  /** Called with a part of the splats that stands for all, before the whole is read. See `ReadSceneOptions.onPreview`. */
+  /** Called with a preview before the whole scene is read. See `ReadSceneOptions.onPreview`. */
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
 
-/** Smaller scenes are read as fast as a preview would be. */
+/** Smaller scenes are read as fast as a preview. */
 const MIN_PREVIEWED = 50_000;
 
-/** True if a preview was asked for, and a scene of `count` splats is large enough for one to be worth its time. */
+/** Whether a preview was requested, and a scene of `count` splats is large enough for one. */
 export function previewWanted({ onPreview }: SceneSource, count: number): boolean {
   return onPreview !== undefined && count >= MIN_PREVIEWED;
 }
@@ -44,36 +44,36 @@ export function previewWanted({ onPreview }: SceneSource, count: number): boolea
 /**
  * Opens another file of the same scene.
  *
- * @param path as the scene writes it: relative to the scene's own file, `/` between folders, not URL-encoded.
- * @param query what the scene appends for the server, from its `?` on; absent for nothing.
- * @returns the whole file.
+ * @param path As in the scene: relative to the scene's own file, `/` between folders, not URL-encoded.
+ * @param query Query that the scene appends for the server, from its `?` on; absent for none.
+ * @returns The whole file.
  */
 export type OpenPart = (path: string, query?: string) => Promise<Uint8Array>;
 
 /**
- * Reads one file format into a cloud. A reader checks every size against the bytes present and charges it to the load's budget before it allocates, throws
- * `GaussianSplatError` with a code of the `decode` family (or `out-of-memory/budget`), and leaves it to `readScene`
- * to drop unusable splats.
+ * Reads one file format into a cloud. A reader checks every size against the available bytes and charges it to the
+ * load's budget before it allocates, throws `GaussianSplatError` with a code of the `decode` family (or
+ * `out-of-memory/budget`), and lets `readScene` drop unusable splats.
  */
 export type SceneReader = (source: SceneSource) => GaussianCloud | Promise<GaussianCloud>;
 
 export type SceneFormatName =
   'ply' | 'compressed-ply' | 'spz' | 'splat' | 'ksplat' | 'sog' | 'lod' | 'gltf' | 'zip' | 'rad';
 
-/** A file format that `readScene` reads: what it is called, how it is recognised, and where its reader is. */
+/** A file format of `readScene`: its names, its signature, and its reader. */
 export interface SceneFormat {
   readonly name: SceneFormatName;
-  /** Name for readers. */
+  /** Display name. */
   readonly title: string;
   /** File extensions in lower case, with the dot. A format may share an extension with another. */
   readonly extensions: readonly string[];
   /** Media types seen in use; none of them is registered with IANA. */
   readonly mimeTypes: readonly string[];
-  /** True if the first bytes of the file prove this format. Absent where the format has no signature. */
+  /** Whether the first bytes of the file prove this format. Absent if the format has no signature. */
   readonly hasSignature?: (bytes: Uint8Array) => boolean;
-  /** True if the reader can read a file whose end is missing: see `readPrefix`. */
+  /** Whether the reader supports a file without its end: see `readPrefix`. */
   readonly readsPrefix?: boolean;
-  /** True if the first bytes may be damaged and the name still be right: a reader then says what is wrong. */
+  /** Whether the signature may be damaged while the name is right, so that the reader can report the fault. */
   readonly isSignatureWeak?: boolean;
   /** Loads the reader; a dynamic import, so that a page fetches only the readers it needs. */
   readonly load: () => Promise<SceneReader>;

@@ -4,11 +4,17 @@ import { damaged } from './faults.js';
 import { parseJson, show, type Json } from './json.js';
 import { MAX_MANIFEST_BYTES } from './signatures.js';
 
-/** Scene files that follow one another in time. */
+/** A sequence of scene files over time. */
 export interface SceneSequence {
-  /** Paths relative to the manifest, in order, or how they are made. Each is a scene file of any format; with {@link motion} only the first is. See {@link framePath}. */
+  /**
+   * Paths relative to the manifest, in order, or a pattern for them. Each is a scene file of any format; with {@link
+   * motion} only the first is. See {@link framePath}.
+   */
   readonly frames: readonly string[] | FramePattern;
-  /** Files of what the frames after the first differ by from it: see {@link motionPath}. Undefined: each frame is a scene file. */
+  /**
+   * Files with the differences of later frames from the first: see {@link motionPath}. Undefined: each frame is a scene
+   * file.
+   */
   readonly motion?: SequenceMotion;
   /** Number of frames. */
   readonly frameCount: number;
@@ -17,19 +23,19 @@ export interface SceneSequence {
   readonly durationSeconds: number;
 }
 
-/** Where the frames after the first are. */
+/** Files of the frames after the first. */
 export interface SequenceMotion {
   /** Paths of the files of motion, as {@link SceneSequence.frames}. */
   readonly frames: readonly string[] | FramePattern;
-  /** Frames of a file, but for the last, which has what is left. */
+  /** Frames in each file, except the last, which has the rest. */
   readonly framesPerFile: number;
 }
 
-/** A frame as the one of a file of motion. */
+/** Location of a frame in a file of motion. */
 export interface MovedFrame {
   /** Path of the file, relative to the manifest. */
   readonly path: string;
-  /** Number of the frame in the file, and how many the file has. */
+  /** Index of the frame in the file, and number of frames in it. */
   readonly frame: number;
   readonly frames: number;
 }
@@ -40,16 +46,16 @@ export interface FramePattern {
   readonly behind: string;
   /** Number of the first frame. */
   readonly first: number;
-  /** Digits that a number has at least. */
+  /** Minimum number of digits. */
   readonly digits: number;
 }
 
 const MAX_FRAMES = 1_000_000;
-/** Frames of a file of motion: their curves are small against what the splats follow of them. */
+/** Maximum number of frames in a file of motion: the curves then stay small compared with the codes. */
 const MAX_PER_FILE = 4096;
-/** Digits of a number at most: more than are exact. */
+/** Maximum number of digits, limited by exact integers. */
 const MAX_DIGITS = 15;
-/** `frame-{0001}.spz`: the digits say where numbering begins, and how many digits numbers have at least. */
+/** `frame-{0001}.spz`: the digits define the first number and the minimum number of digits. */
 const PATTERN = /^([^{}]*)\{(\d+)\}([^{}]*)$/;
 
 type Fail = (path: string, expected: string, found: unknown) => never;
@@ -93,7 +99,7 @@ function firstOf({ first }: Json, fail: Fail): string {
   return typeof first === 'string' && first !== '' ? first : fail('first', 'the path of a scene file', first);
 }
 
-/** Files for all frames but the first. */
+/** Files of all frames but the first. */
 function motionOf({ motion, framesPerFile, count }: Json, fail: Fail): SequenceMotion {
   if (!Number.isInteger(framesPerFile) || (framesPerFile as number) < 1 || (framesPerFile as number) > MAX_PER_FILE) {
     fail('framesPerFile', `1 to ${grouped(MAX_PER_FILE)}`, framesPerFile);
@@ -105,7 +111,7 @@ function motionOf({ motion, framesPerFile, count }: Json, fail: Fail): SequenceM
   return { frames: files, framesPerFile: framesPerFile as number };
 }
 
-/** Where a frame is that is not in a scene file of its own; undefined for one that is. */
+/** Returns the location of a frame without a scene file of its own; undefined for one with it. */
 export function movedFrame({ motion, frameCount }: SceneSequence, frame: number): MovedFrame | undefined {
   if (motion === undefined || frame === 0) return undefined;
   const { framesPerFile } = motion;
@@ -115,7 +121,7 @@ export function movedFrame({ motion, frameCount }: SceneSequence, frame: number)
   return { path: framePath(motion, file), frame: frame - begins, frames };
 }
 
-/** Paths of all files, in the order in which frames need them. */
+/** Iterates over the paths of all files, in the order of the frames that need them. */
 export function* sequencePaths(sequence: SceneSequence): Generator<string> {
   const { motion, frameCount } = sequence;
   const own = motion ? 1 : frameCount;
@@ -123,20 +129,23 @@ export function* sequencePaths(sequence: SceneSequence): Generator<string> {
   for (let file = 0; motion && file * motion.framesPerFile < frameCount - 1; file++) yield framePath(motion, file);
 }
 
-/** Path of a frame, relative to the manifest: of a pattern it is made now, for a short one may stand for a million. */
+/**
+ * Returns the path of a frame, relative to the manifest; expanded on demand, because a short pattern may represent a
+ * million paths.
+ */
 export function framePath({ frames }: Pick<SceneSequence, 'frames'>, frame: number): string {
   if (!('digits' in frames)) return frames[frame];
   const { before, behind, first, digits } = frames;
   return before + String(first + frame).padStart(digits, '0') + behind;
 }
 
-/** The number of the frame that is shown at a time; times before the first and after the last frame give these, or wrap around. */
+/** Returns the index of the frame at a time; times outside the sequence are clamped, or wrap around. */
 export function frameAt(
   { frameCount, framesPerSecond }: Pick<SceneSequence, 'frameCount' | 'framesPerSecond'>,
   timeSeconds: number,
   loop = false,
 ): number {
-  // The small number: 1/24 s times 24 must not fall into the frame before.
+  // The small offset keeps 1/24 s times 24 from rounding down to the previous frame.
   const frame = Math.floor(timeSeconds * framesPerSecond + 1e-6);
   return loop ? ((frame % frameCount) + frameCount) % frameCount : Math.min(frameCount - 1, Math.max(0, frame || 0));
 }

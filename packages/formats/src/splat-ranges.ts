@@ -4,22 +4,23 @@ import { plainBytes, type FileBytes } from './bytes.js';
 import { findFormat } from './detect.js';
 import type { SplatRange } from './scene-format.js';
 
-/** What is known before they are read of splats any of which can be read without the others. */
+/** Properties of a scene whose splats can be read in ranges, known before they are read. */
 export interface SplatRanges {
-  /** Number of splats, those too that cannot be drawn. */
+  /** Number of splats, including unusable ones. */
   readonly count: number;
   readonly shDegree: ShDegree;
-  /** Where they lie if the splats of the file take as many bytes each: byte of the first, and bytes of one. */
+  /** Location of splats of a fixed size: offset of the first, and size of one in bytes. */
   readonly rows?: { readonly start: number; readonly byteLength: number };
 }
 
 /**
- * Tells whether some of a scene's splats can be read without the others, so that several threads can share the reading: of binary PLY whose rows have one size and float32
- * coordinates, and of uncompressed glTF.
+ * Returns whether ranges of a scene's splats can be read independently, so that several threads can share the work: for
+ * binary PLY with rows of one size and float32 coordinates, and for uncompressed glTF.
  *
- * @param file the whole file; of a PLY `HEADER_BYTES` of its beginning are enough, and it is not checked that the rest is there.
- * @returns undefined if it must be read whole
- * @throws GaussianSplatError as `readScene` does for what is wrong with a header
+ * @param file The whole file; for a PLY the first `HEADER_BYTES` are enough, and the presence of the rest is not
+ * checked.
+ * @returns Undefined if it must be read as a whole.
+ * @throws GaussianSplatError as `readScene` does for invalid headers.
  */
 export async function splatRanges(file: FileBytes, name: string): Promise<SplatRanges | undefined> {
   const bytes = plainBytes(file, name);
@@ -33,11 +34,12 @@ export async function splatRanges(file: FileBytes, name: string): Promise<SplatR
 }
 
 /**
- * Reads some of the splats of a scene that {@link splatRanges} describes: what `readScene` makes of them, without regard to the rest of the file.
+ * Reads a range of the splats of a scene that {@link splatRanges} describes: same as `readScene`, without regard to the
+ * rest of the file.
  *
- * @param file the whole file
- * @returns the splats in the order of the file. Those that cannot be drawn are left out, which may be all.
- * @throws GaussianSplatError as `readScene` does
+ * @param file The whole file.
+ * @returns The splats in the order of the file. Unusable ones are dropped, possibly all.
+ * @throws GaussianSplatError as `readScene` does.
  */
 export async function readSplats(file: FileBytes, range: SplatRange, name: string): Promise<GaussianCloud> {
   const bytes = plainBytes(file, name);

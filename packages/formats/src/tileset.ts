@@ -1,4 +1,4 @@
-/** The tree of a tileset of 3D Tiles 1.0 and 1.1 (OGC 22-025): which files are drawn at a level of detail, and where. */
+/** The tree of a 3D Tiles 1.0 or 1.1 tileset (OGC 22-025): the files and transforms of a level of detail. */
 import { grouped } from './bytes.js';
 import { damaged } from './faults.js';
 import { multiply, type Affine } from './gltf/nodes.js';
@@ -8,28 +8,29 @@ import { MAX_INDEX_BYTES } from './lod/meta.js';
 const MAX_TILES = 100_000;
 const MAX_DEPTH = 500;
 
-/** A file that a tile names. */
+/** A file of a tile. */
 export interface TileContent {
-  /** As the tileset writes it, with its query. */
+  /** URI as in the tileset, with its query. */
   readonly uri: string;
-  /** From the frame of its tile, whose third axis points up, to the tileset's. */
+  /** From the coordinates of its tile (z up) to those of the tileset. */
   readonly toTileset: Affine;
 }
 
-/** The tile itself, or those below it that replace it. */
+/** The tile itself, or the child tiles that replace it. */
 interface Tile {
   readonly contents: readonly TileContent[];
   readonly children: readonly Tile[];
-  /** It is drawn beside its children, too. */
+  /** Whether it is drawn in addition to its children. */
   readonly isAdded: boolean;
 }
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
 /**
- * The files that show a tileset at a level: 0 is the finest, and each further one leaves out the lowest tiles of all branches.
- * @param load counts the tiles of all tilesets of a load, which share one limit
- * @param toParent from the tileset's frame to that of the one which names it
+ * Returns the files of a tileset at a level: 0 is the finest, and each further level drops the lowest tiles of all
+ * branches.
+ * @param load Counts the tiles of all tilesets of a load, which share one limit.
+ * @param toParent From the coordinates of the tileset to those of its parent.
  */
 export function contentsAt(
   source: JsonSource,
@@ -59,7 +60,7 @@ export function contentsAt(
   return drawnOf(open(root, toParent, false, 'root', 0), level).contents;
 }
 
-/** What is drawn of a tile, and how many levels lie below it. */
+/** Content of a tile at a level, and the height of its subtree. */
 function drawnOf(tile: Tile, level: number): { contents: TileContent[]; height: number } {
   const below = tile.children.map((child) => drawnOf(child, level));
   const height = below.reduce((most, child) => Math.max(most, child.height + 1), 0);
@@ -69,7 +70,7 @@ function drawnOf(tile: Tile, level: number): { contents: TileContent[]; height: 
   return { contents: tile.isAdded ? [...tile.contents, ...inner] : inner, height };
 }
 
-/** `content` of one file, `contents` of several; `url` is the name of drafts. */
+/** `content` for one file, `contents` for several; drafts used `url`. */
 function urisOf({ content, contents }: Json): string[] {
   const all: unknown[] = Array.isArray(contents) ? contents : [content];
   return all.flatMap((one) => {
@@ -78,7 +79,7 @@ function urisOf({ content, contents }: Json): string[] {
   });
 }
 
-/** Column by column in the file. */
+/** Column-major in the file. */
 function transformOf({ transform }: Json, where: string): Affine {
   if (transform === undefined) return IDENTITY;
   const m = transform as number[];

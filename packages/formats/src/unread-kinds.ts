@@ -1,15 +1,18 @@
-/** Files of splats, or beside them, that are known but not read: how they are told, and what to do. Loaded with diagnose.ts, when a file has been refused. */
+/**
+ * Known but unsupported kinds of splat files and companion files: their signatures, and remedies. Loaded with
+ * diagnose.ts after a file has been rejected.
+ */
 import { startsWith } from './bytes.js';
 
-/** A kind of file that is recognised only to say what it is. */
+/** A kind of file that is recognized only for an error message. */
 export interface UnreadKind {
   readonly found: string;
   readonly remedy: string;
-  /** Ends of the file's name, without the dot. */
+  /** Extensions of the file name, without the dot. */
   readonly extensions?: RegExp;
-  /** Tells it by its bytes, or by its first words. */
+  /** Recognizes it by its bytes, or by its first words. */
   readonly fits?: (bytes: Uint8Array, text: string) => boolean;
-  /** A path that an archive of this kind has. */
+  /** A path that identifies an archive of this kind. */
   readonly within?: RegExp;
 }
 
@@ -88,7 +91,7 @@ export const UNREAD_KINDS: readonly UnreadKind[] = [
   },
 ];
 
-/** The kind of a file; undefined for all others. */
+/** Returns the kind of a file; undefined for all others. */
 export function unreadKind(bytes: Uint8Array, text: string, extension: string): UnreadKind | undefined {
   const end = extension.slice(1);
   return (

@@ -13,11 +13,13 @@ import type { InputNumbers } from './input-value.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * The values of a generator's inputs, in the conventions that its contract declares. Inputs with the roles `gaussians`,
- * `image` and `state` are left out: their tensors come from another generator, from an image or from the run before.
+ * Values of a generator's inputs, in the conventions of its contract. Inputs with the roles `gaussians`, `image` and
+ * `state` are excluded: their tensors come from another generator, from an image or from the previous run.
  *
- * @param header of a file that keeps the contract (`checkContract` found nothing); of a model of several instances that of one (`oneInstance`).
- * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not finite.
+ * @param header Header of a valid file (`checkContract` found nothing); for a model of several instances that of one
+ * (`oneInstance`).
+ * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not
+ * finite.
  */
 export function bindInputs(
   header: OnnxHeader,
@@ -71,16 +73,16 @@ function numbersOf(
   }
 }
 
-/** A share of a frame that is rounding, such as that of 29/25 s, which times 25 is less than 29. */
+/** Tolerance for rounding, as a fraction of a frame: 29/25 s times 25 is less than 29. */
 const FRAME_ROUNDING = 1e-6;
 
-/** The frame that a time falls into. The end of the duration is within the last one: none begins there. */
+/** Index of the frame at a time. The end of the duration belongs to the last frame. */
 function frameAt(timeSeconds: number, { fps = 0, duration = Infinity }: Contract): number {
   const last = Math.ceil(duration * fps - FRAME_ROUNDING) - 1;
   return Math.max(0, Math.min(Math.floor(timeSeconds * fps + FRAME_ROUNDING), fps > 0 ? last : 0));
 }
 
-/** Zeros, or for quaternions and matrices the identity. */
+/** Zeros, or the identity for quaternions and matrices. */
 function restPose(input: OnnxTensor, { format, quaternionOrder }: InputBinding & { role: 'pose' }): number[] {
   const quaternion = quaternionOrder === 'xyzw' ? [0, 0, 0, 1] : [1, 0, 0, 0];
   const joint = { quaternion, matrix: [1, 0, 0, 0, 1, 0, 0, 0, 1], 'axis-angle': [0], parameters: [0] }[format];

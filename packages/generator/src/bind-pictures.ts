@@ -5,9 +5,10 @@ import { elementsOf, type GpuTensor } from './input-value.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * Pictures for the inputs with the role `image`.
- * @param given inputs that a model before this one writes, and that the state need not have.
- * @throws GaussianSplatError `argument/value` for a picture that is missing, or of another size or element type than the input.
+ * Images for the inputs with the role `image`.
+ * @param given Inputs that a previous model writes, which the state may omit.
+ * @throws GaussianSplatError `argument/value` for an image that is missing, or has another size or element type than
+ * the input.
  */
 export function bindPictures(
   header: OnnxHeader,
@@ -21,7 +22,7 @@ export function bindPictures(
     const picture = state.pictures?.[input.name];
     if (picture === undefined) throw missing(input);
     if (!fits(picture, input)) throw misfit(picture, input);
-    // As it is now: whoever owns it may change it.
+    // Copied, because the owner may modify it.
     const { buffer, dtype, dims, version } = picture;
     pictures[input.name] = { buffer, dtype, dims: dimsFor(input, dims), version };
   }
@@ -39,13 +40,13 @@ function fits({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor): boolean {
   );
 }
 
-/** The input's own dimensions, batches of one included; sizes that it leaves open are the picture's. */
+/** Dimensions of the input, including batches of one; open sizes are those of the image. */
 function dimsFor({ dims: sizes = [] }: OnnxTensor, dims: readonly number[]): number[] {
   const before = dims.length - sizes.length;
   return sizes.map((size, i) => (typeof size === 'number' ? size : dims[before + i]));
 }
 
-/** What an input of the role `image` takes: planes, images, and sizes as far as the file fixes them. */
+/** Requirements of an input with the role `image`: planes, number of images, and the sizes that the file fixes. */
 export function imageShapeOf({ dims = [], dtype }: OnnxTensor): {
   readonly width: number | undefined;
   readonly height: number | undefined;

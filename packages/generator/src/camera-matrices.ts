@@ -2,21 +2,21 @@ import type { Camera } from '@gaussian-splat/core';
 import type { CameraAxes, MatrixOrder } from '@gaussian-splat/core/contract';
 import { inverse, multiply } from '@gaussian-splat/core';
 
-/** Signs that turn OpenCV's camera axes (right, down, forward) into others. */
+/** Signs that convert OpenCV's camera axes (right, down, forward) to others. */
 function axisSigns(axes: CameraAxes): readonly [number, number, number] {
   return [axes[0] === 'R' ? 1 : -1, axes[1] === 'D' ? 1 : -1, axes[2] === 'F' ? 1 : -1];
 }
 
-/** World to camera with the axes declared; row-major float64. */
+/** World to camera with the declared axes; row-major float64. */
 export function viewMatrix({ worldToCamera }: Camera, axes: CameraAxes): Float64Array {
   const signs = axisSigns(axes);
   return Float64Array.from({ length: 16 }, (_, i) => worldToCamera[i] * (i < 12 ? signs[Math.floor(i / 4)] : 1));
 }
 
-/** Camera to world, from the axes declared: the inverse of {@link viewMatrix}; row-major float64. */
+/** Camera to world, from the declared axes: the inverse of {@link viewMatrix}; row-major float64. */
 export const cameraToWorld = (camera: Camera, axes: CameraAxes): Float64Array => inverse(viewMatrix(camera, axes));
 
-/** fx 0 cx, 0 fy cy, 0 0 1, or fx, fy, cx, cy alone; in pixels, or as shares of the picture's sides. */
+/** fx 0 cx, 0 fy cy, 0 0 1, or only fx, fy, cx, cy; in pixels, or as fractions of the image size. */
 export function intrinsicsOf(camera: Camera, unit: 'pixels' | 'normalized', isMatrix: boolean): number[] {
   const [across, down] = unit === 'normalized' ? [camera.width, camera.height] : [1, 1];
   const [fx, fy, cx, cy] = [camera.fx / across, camera.fy / down, camera.cx / across, camera.cy / down];
@@ -24,8 +24,8 @@ export function intrinsicsOf(camera: Camera, unit: 'pixels' | 'normalized', isMa
 }
 
 /**
- * Camera to clip space as WebGPU has it: x right, y up, depth 0 at `near` and 1 at `far`, w the distance along the line of
- * sight in world units; row-major float64. A point lands where the camera's intrinsics put it, off-centre ones included.
+ * Camera to clip space as in WebGPU: x right, y up, depth 0 at `near` and 1 at `far`, w the distance along the optical
+ * axis in world units; row-major float64. Off-center intrinsics are supported.
  */
 export function projectionMatrix(camera: Camera, axes: CameraAxes): Float64Array {
   const { width, height, fx, fy, cx, cy, near, far } = camera;
@@ -45,7 +45,7 @@ export function viewProjectionMatrix(camera: Camera): Float64Array {
   return multiply(projectionMatrix(camera, 'RDF'), viewMatrix(camera, 'RDF'));
 }
 
-/** The numbers of a row-major matrix in the order declared. */
+/** The numbers of a row-major matrix in the declared order. */
 export function inOrder(matrix: ArrayLike<number>, order: MatrixOrder): number[] {
   return Array.from({ length: 16 }, (_, i) => matrix[order === 'row-major' ? i : 4 * (i % 4) + Math.floor(i / 4)]);
 }

@@ -6,63 +6,64 @@ import type { ModelSource } from './runtime/open-model.js';
 import { receiveGaussians, type ThreeScene } from './scene-hosts.js';
 import type { GeneratorState } from './state.js';
 
-/** Makes what the Gaussians of a model are written into, for example `DynamicGaussians.create(device, layout)`. */
+/** Creates the sink for the Gaussians of a model, for example `DynamicGaussians.create(device, layout)`. */
 export type MakeSink<S extends GaussianSink> = (layout: GaussianLayout, contract: Contract) => S | Promise<S>;
 
 /** A model in the scene. */
 export interface GaussianModel<S extends GaussianSink = GaussianSink> {
-  /** The name that its generator is registered with. */
+  /** Registered name of its generator. */
   readonly name: string;
   readonly generator: Generator;
-  /** What is drawn. */
+  /** The drawn Gaussians. */
   readonly gaussians: S;
-  /** State of this model alone, on top of what `runGenerators` is given. */
+  /** State of this model only, in addition to that of `runGenerators`. */
   state: GeneratorState;
-  /** Where it stands in a `World`; undefined elsewhere. */
+  /** Its placement in a `World`; undefined elsewhere. */
   readonly placement: Placement | undefined;
-  /** Takes it out of the scene. A sink that the page made belongs to the page; one that was made for a scene is destroyed. */
+  /** Removes it from the scene. A sink that the page created stays; one that was created for a scene is destroyed. */
   remove(): void;
 }
 
-/** Where a model goes: a world, a scene of three.js, or what makes a sink. */
+/** Destination of a model: a world, a scene of three.js, or a factory of a sink. */
 export type GaussianModelScene<S extends GaussianSink = GaussianSink> = World | ThreeScene | MakeSink<S>;
 
-/** Gives the inputs of a model for the next run, or nothing to leave them as they are. */
+/** Returns changed inputs of a model for the next run, or nothing to keep them. */
 export type FrameUpdate = (state: GeneratorState, model: GaussianModel) => GeneratorState | undefined | void;
 
-/** The Gaussians of a model, with what only those in a scene have. */
+/** The Gaussians of a model, with the members that only a scene provides. */
 type Hosted = Pick<GaussianModel, 'gaussians'> & Partial<Pick<GaussianModel, 'placement' | 'remove'>>;
 
-/** A generator by its name. */
+/** A generator with its source. */
 interface Registered {
   readonly source: ModelSource;
   readonly after: string | undefined;
 }
 
-/** Generators by name, and the models that show them: what a page of several generators keeps. */
+/** Generators by name, and the models that use them: a registry for pages with several generators. */
 export class GaussianModels {
   readonly #sources = new Map<string, Registered>();
   readonly #models = new Set<GaussianModel>();
   readonly #updates = new Set<FrameUpdate>();
   readonly #listeners = new Set<(model: GaussianModel, frame: GeneratedFrame) => void>();
   readonly #failures = new Set<(model: GaussianModel | undefined, error: unknown) => void>();
-  /** Generators by name, on their way or there. */
+  /** Generators by name, loading or loaded. */
   readonly #loaded = new Map<string, Promise<Generator>>();
   #device: GPUDevice | undefined;
   #cleared = new AbortController();
 
   /**
-   * Gives a generator a name. Nothing is fetched yet.
-   * @param options.after name of the generator whose Gaussians this one takes: they run as a chain.
+   * Registers a generator. Nothing is fetched yet.
+   * @param options.after Name of the generator whose Gaussians this one receives: they run as a chain.
    */
   registerGaussianGenerator(name: string, source: ModelSource, options: { readonly after?: string } = {}): void {
     this.#sources.set(name, { source, after: options.after });
   }
 
   /**
-   * Fetches and checks all registered generators, for a device. Those that are there, or on their way, are not fetched again.
-   * @throws what `Generator.open` throws for the first that fails; ContractError `contract/chain` for generators that follow one another in
-   * a circle, GaussianSplatError `argument/value` for one that follows an unknown name; an `AbortError` if {@link clear} is called meanwhile.
+   * Fetches and checks all registered generators, for a device. Loaded or loading ones are not fetched again.
+   * @throws errors of `Generator.open` for the first that fails; ContractError `contract/chain` for a cycle of
+   * generators, GaussianSplatError `argument/value` for one that follows an unknown name; an `AbortError` if {@link
+   * clear} is called meanwhile.
    */
   async loadAllGenerators(device: GPUDevice): Promise<void> {
     this.#device = device;
@@ -81,17 +82,17 @@ export class GaussianModels {
   }
 
   /**
-   * Puts a model into a scene. Models of one generator share its session.
+   * Adds a model to a scene. Models of one generator share its session.
    *
    * ```ts
    * await models.addGaussianModelToScene('ball', world, { sceneToWorld }); // drawn by each Viewpoint of the world
    * await models.addGaussianModelToScene('ball', scene); // of three.js, drawn by a SplatRenderer
    * await models.addGaussianModelToScene('ball', (layout) => DynamicGaussians.create(device, layout)); // a sink of your own
    * ```
-   * @param placed how it stands in a world.
-   * @throws GaussianSplatError `argument/value` for a name that is not registered, before {@link loadAllGenerators}, or for a scene that no
-   * renderer draws; what `makeSink` throws; an `AbortError` if {@link clear} is called meanwhile: a sink that `makeSink` has made then stays
-   * with its maker.
+   * @param placed Its placement in a world.
+   * @throws GaussianSplatError `argument/value` for a name that is not registered, before {@link loadAllGenerators}, or
+   * for a scene without a renderer; errors of `makeSink`; an `AbortError` if {@link clear} is called meanwhile: a sink
+   * from `makeSink` then stays with the caller.
    */
   async addGaussianModelToScene(
     name: string,
@@ -141,19 +142,22 @@ export class GaussianModels {
   }
 
   /**
-   * Calls `update` before each run of each model. What it returns is laid over the state that {@link runGenerators} was given.
+   * Calls `update` before each run of each model. Its result overrides the state of {@link runGenerators}.
    *
    * ```ts
    * models.onFrame(({ timeSeconds = 0 }) => ({ controls: { swing: Math.sin(timeSeconds) } }));
    * ```
-   * @returns what ends it.
+   * @returns A function that unsubscribes.
    */
   onFrame(update: FrameUpdate): () => void {
     this.#updates.add(update);
     return () => this.#updates.delete(update);
   }
 
-  /** Calls `listener` with each finished run of each model, and `onError` with runs that fail. @returns what ends it. */
+  /**
+   * Calls `listener` with each finished run of each model, and `onError` with failed runs. @returns A function that
+   * unsubscribes.
+   */
   onGenerated(
     listener: (model: GaussianModel, frame: GeneratedFrame) => void,
     onError?: (model: GaussianModel | undefined, error: unknown) => void,
@@ -167,9 +171,9 @@ export class GaussianModels {
   }
 
   /**
-   * Asks all models for the Gaussians of a state, laid over by what the callbacks of {@link onFrame} return, and by each model's own `state`.
-   * Returns at once.
-   * @throws GaussianSplatError `argument/value` if a state does not fit a contract.
+   * Requests the Gaussians of a state from all models; results of {@link onFrame} callbacks and each model's own
+   * `state` override it. Returns at once.
+   * @throws GaussianSplatError `argument/value` if a state does not match a contract.
    */
   runGenerators(state: GeneratorState = {}): void {
     for (const model of this.#models) {
@@ -180,7 +184,7 @@ export class GaussianModels {
     }
   }
 
-  /** Takes all models out and forgets all names. */
+  /** Removes all models and all names. */
   clear(): void {
     for (const model of [...this.#models]) model.remove();
     this.#cleared.abort();
@@ -195,7 +199,7 @@ export class GaussianModels {
     this.#device = undefined;
   }
 
-  /** Rejects, too, where it is there but has been cleared meanwhile. */
+  /** Also rejects if the generator was loaded but has been cleared meanwhile. */
   async #open(
     name: string,
     device: GPUDevice,
@@ -207,7 +211,7 @@ export class GaussianModels {
     throw options.signal.reason;
   }
 
-  /** Sources from the first of the chain that ends with a name. */
+  /** Sources from the first generator of the chain to the given one. */
   #chainOf(last: string): readonly ModelSource[] {
     const names: string[] = [];
     for (let name: string | undefined = last; name !== undefined; name = this.#sources.get(name)?.after) {
@@ -219,7 +223,7 @@ export class GaussianModels {
   }
 }
 
-/** Controls and images of both, by their names; of everything else the second. */
+/** Merges controls and images by name; other fields of the second override the first. */
 function merged(state: GeneratorState, over: GeneratorState): GeneratorState {
   const { controls, pictures } = state;
   return {
@@ -230,7 +234,7 @@ function merged(state: GeneratorState, over: GeneratorState): GeneratorState {
   };
 }
 
-/** Controls of a model alone must be its own; those of all models may belong to another. */
+/** Controls of a single model must exist in it; those of all models may belong to others. */
 function requireControls({ name, generator, state }: GaussianModel): void {
   if (state.controls === undefined) return;
   const known = generator.models.flatMap(({ contract }) =>
@@ -266,20 +270,20 @@ function unknownGenerator(name: string, known: readonly string[]): GaussianSplat
   });
 }
 
-/** The page's own. */
+/** The default registry of the page. */
 const page = new GaussianModels();
 
-/** {@link GaussianModels.registerGaussianGenerator} of the page. */
+/** {@link GaussianModels.registerGaussianGenerator} of the default registry. */
 export const registerGaussianGenerator: GaussianModels['registerGaussianGenerator'] = (name, source, options) =>
   page.registerGaussianGenerator(name, source, options);
-/** {@link GaussianModels.loadAllGenerators} of the page. */
+/** {@link GaussianModels.loadAllGenerators} of the default registry. */
 export const loadAllGenerators: GaussianModels['loadAllGenerators'] = (device) => page.loadAllGenerators(device);
-/** {@link GaussianModels.addGaussianModelToScene} of the page. */
+/** {@link GaussianModels.addGaussianModelToScene} of the default registry. */
 export const addGaussianModelToScene: GaussianModels['addGaussianModelToScene'] =
   page.addGaussianModelToScene.bind(page);
-/** {@link GaussianModels.onFrame} of the page. */
+/** {@link GaussianModels.onFrame} of the default registry. */
 export const onFrame: GaussianModels['onFrame'] = (update) => page.onFrame(update);
-/** {@link GaussianModels.onGenerated} of the page. */
+/** {@link GaussianModels.onGenerated} of the default registry. */
 export const onGenerated: GaussianModels['onGenerated'] = (listener, onError) => page.onGenerated(listener, onError);
-/** {@link GaussianModels.runGenerators} of the page. */
+/** {@link GaussianModels.runGenerators} of the default registry. */
 export const runGenerators: GaussianModels['runGenerators'] = (state) => page.runGenerators(state);

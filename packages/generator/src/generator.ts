@@ -9,32 +9,35 @@ import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
-/** Takes what runs write: `DynamicGaussians` of the renderer is one. It must submit its work before it returns. */
+/**
+ * Consumes the output of runs: `DynamicGaussians` of the renderer implements it. It must submit its work before it
+ * returns.
+ */
 export interface GaussianSink {
   /**
-   * @param rows of one instance.
-   * @param instance which instance of a run of several is this one's, 0 and up: its rows begin in each tensor at `instance * rows`, and its live
-   * count is element `instance` of that tensor.
+   * @param rows Number of rows of one instance.
+   * @param instance Index of this instance in a run of several: its rows begin in each tensor at `instance * rows`, and
+   * its live count is element `instance` of that tensor.
    */
   ingest(tensors: RunOutputs['tensors'], rows: number, instance: number): void;
 }
 
 /** A run whose Gaussians have reached the sink. */
 export interface GeneratedFrame {
-  /** The state that it shows. */
+  /** The state of the run. */
   readonly state: GeneratorState;
-  /** From the start of the run until its work was submitted, ms; the GPU may still be at it. */
+  /** From the start of the run until its work was submitted, ms; the GPU may not have finished. */
   readonly milliseconds: number;
 }
 
 export interface GeneratorOptions extends AcquireOptions {
   /**
-   * Bytes until now of all models and of the runtime, if that is not there yet, and of how many. Goes on after {@link Generator.open}, until the
-   * runtime has come with the first run; warming up comes after that.
+   * Called with the received and total bytes of all models, and of the runtime unless it is loaded. Continues after
+   * {@link Generator.open}, until the first run has loaded the runtime; warm-up follows.
    */
   readonly onProgress?: AcquireOptions['onProgress'];
   readonly onFrame?: (frame: GeneratedFrame) => void;
-  /** A run failed; what was shown before stays. The next request tries again. */
+  /** Called when a run fails; the previous content remains. The next request tries again. */
   readonly onError?: (error: unknown) => void;
 }
 
@@ -46,31 +49,31 @@ interface RunRequest {
   readonly inputs: readonly Inputs[];
 }
 
-/** The wish of an instance among others of its model. */
+/** Request of one instance in a batch. */
 interface InstanceRequest {
   readonly state: GeneratorState;
   readonly inputs: Inputs;
 }
 
 /**
- * One instance of a generator: runs it for the latest state asked for, as fast as runs finish and never faster. Instances of a model whose
- * contract declares them run together.
+ * One instance of a generator: runs it for the latest requested state, as fast as runs finish and never faster.
+ * Instances of a model whose contract declares them run together.
  *
  * ```ts
  * const generator = await Generator.open({ url: 'walker.onnx' }, device, { onFrame: requestDraw });
  * generator.sink = await DynamicGaussians.create(device, generator.model.layout);
- * generator.request({ camera, timeSeconds }); // as often as you like
+ * generator.request({ camera, timeSeconds }); // any number of times
  * ```
  */
 export class Generator {
-  /** Where runs go; without one there are no runs. */
+  /** Destination of runs; nothing runs without one. */
   sink: GaussianSink | undefined;
   readonly #chain: Chain;
   readonly #options: GeneratorOptions;
   readonly #runner: RunLoop<RunRequest> | Seat<InstanceRequest>;
   #shown: RunRequest['inputs'] | undefined;
   #asked: RunRequest | undefined;
-  /** Of the last run. */
+  /** Inputs of the last run. */
   #timeSeconds = 0;
   #runs = 0;
 
@@ -82,10 +85,10 @@ export class Generator {
   }
 
   /**
-   * Fetches a generator, or several of which each takes the Gaussians of the one before it, and checks them; not a byte of the runtime
-   * is fetched yet.
-   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not fit one another, or do
-   * not write Gaussians in the end.
+   * Fetches a generator, or a chain of generators that pass on their Gaussians, and checks them; the runtime is not
+   * fetched yet.
+   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not
+   * match, or whose last one does not write Gaussians.
    */
   static async open(
     source: ModelSource | readonly ModelSource[],
@@ -107,35 +110,35 @@ export class Generator {
     }
   }
 
-  /** The model that writes what is drawn: the last of a chain. */
+  /** The model whose output is drawn: the last of a chain. */
   get model(): GaussianModelFile {
     return this.#chain.models.at(-1) as GaussianModelFile;
   }
 
-  /** All models of the chain, in the order in which they run. */
+  /** All models of the chain, in execution order. */
   get models(): readonly GeneratorModel[] {
     return this.#chain.models;
   }
 
-  /** How it runs, by the slowest of its models; undefined before the first run. */
+  /** Session kind of its slowest model; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#runner instanceof RunLoop ? this.#chain.kind : this.#runner.kind;
   }
 
-  /** Runs that have reached the sink. */
+  /** Number of runs that have reached the sink. */
   get runs(): number {
     return this.#runs;
   }
 
-  /** Fulfils, and never rejects, when no run is on its way. */
+  /** Resolves, and never rejects, when no run is in progress. */
   get idle(): Promise<void> {
     return this.#runner.idle;
   }
 
   /**
-   * Asks for the Gaussians of a state. Returns at once; a request that has not started yet is replaced, and a state whose inputs are
-   * those shown is not run at all.
-   * @throws GaussianSplatError `argument/value` if the state does not fit the contract.
+   * Requests the Gaussians of a state. Returns at once; a request that has not started yet is replaced, and a state
+   * with the inputs of the current content is not run.
+   * @throws GaussianSplatError `argument/value` if the state does not match the contract.
    */
   request(state: GeneratorState): void {
     if (this.#runner.isClosed) return;
@@ -144,7 +147,7 @@ export class Generator {
     this.#askFor(this.#asked);
   }
 
-  /** What is on show was written by a session that is not to be trusted. */
+  /** A session that failed its check has written the current content. */
   #askAgain(): void {
     this.#chain.forget();
     this.#shown = undefined;
@@ -156,7 +159,7 @@ export class Generator {
     else this.#runner.request({ state, inputs: inputs[0] });
   }
 
-  /** Ends it: a run on its way has no effect any more. */
+  /** Closes it: a run in progress has no effect any more. */
   close(): void {
     this.#runner.close();
     this.#chain.release(this.#runner.idle);

@@ -5,13 +5,13 @@ export interface InputNumbers {
   readonly data: Float32Array | Int32Array | BigInt64Array;
 }
 
-/** A tensor that is on the GPU already: an image, or what another model wrote. */
+/** A tensor on the GPU: an image, or the output of another model. */
 export interface GpuTensor {
-  /** Holds the elements without gaps, float16 two to a word; needs the usage COPY_SRC. */
+  /** Holds the elements without gaps, two float16 in each word; needs the usage COPY_SRC. */
   readonly buffer: GPUBuffer;
   readonly dtype: 'float32' | 'float16' | 'int32';
   readonly dims: readonly number[];
-  /** Rises whenever the content changes: by it a run knows whether there is anything new. */
+  /** Incremented whenever the content changes, so that a run can detect new content. */
   readonly version: number;
 }
 
@@ -23,10 +23,12 @@ export type Inputs = Readonly<Record<string, InputValue>>;
 
 export const isOnGpu = (value: InputValue): value is GpuTensor => 'buffer' in value;
 
-/** Elements of a shape. */
+/** Number of elements of a shape. */
 export const elementsOf = (dims: readonly number[]): number => dims.reduce((product, dim) => product * dim, 1);
 
-/** True if two sets of values are the same, bit for bit: a generator without a seed would then write the same again. */
+/**
+ * Whether two sets of values are equal, bit for bit: a generator without a seed would then write the same output again.
+ */
 export function sameInputs(a: Inputs, b: Inputs): boolean {
   const names = Object.keys(a);
   return (

@@ -8,22 +8,23 @@ import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
-/** The input that takes the image. */
+/** The input for the image. */
 export type ImageInput = ReturnType<typeof imageShapeOf> & { readonly name: string };
 
-/** An image that a model has made, on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
+/** The output image of a model on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
 export type FinishedImage = GpuTensor & { readonly dtype: 'float32' | 'float16' };
 
 export interface PostProcessorOptions extends AcquireOptions {
   /**
-   * Takes the finished image, [1,3,H,W]. It must submit its work before it returns: afterwards the buffer is the runtime's again.
+   * Called with the finished image, [1,3,H,W]. It must submit its work before it returns: afterwards the runtime reuses
+   * the buffer.
    */
   readonly onPicture: (picture: FinishedImage) => void;
-  /** A run failed. The next request tries again. */
+  /** Called when a run fails. The next request tries again. */
   readonly onError?: (error: unknown) => void;
 }
 
-/** A filter that keeps 0.8 of what it wrote is within 1/1000 of its end after so many runs of one image. */
+/** Number of runs of one image after which a filter that keeps 0.8 of its output is within 1/1000 of its limit. */
 const MOST_REPEATS = 32;
 
 interface RunRequest {
@@ -31,21 +32,21 @@ interface RunRequest {
 }
 
 /**
- * A model that makes an image of an image (a style, a denoiser), or several one after the other, from GPU buffer to GPU buffer.
+ * A model, or a chain of models, that processes an image (a style, a denoiser), from GPU buffer to GPU buffer.
  *
  * ```ts
- * const post = await PostProcessor.open({ url: 'style.onnx' }, device, { onPicture: paint });
- * post.request(pictureTensor, { controls: { strength: 0.5 } });
+ * const post = await PostProcessor.open({ url: 'style.onnx' }, device, { onImage: paint });
+ * post.request(imageTensor, { controls: { strength: 0.5 } });
  * ```
  */
 export class PostProcessor {
-  /** The input that takes the image. */
+  /** The input for the image. */
   readonly input: ImageInput;
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;
   readonly #loop: RunLoop<RunRequest>;
   #shown: RunRequest['inputs'] | undefined;
-  /** Runs of the same inputs, of models that keep a state. */
+  /** Number of runs with the same inputs, for models with state. */
   #repeats = 0;
   #version = 0;
 
@@ -62,9 +63,9 @@ export class PostProcessor {
   }
 
   /**
-   * Fetches and checks it; not a byte of the runtime is fetched yet.
-   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not fit one another, or do
-   * not make an image of one image.
+   * Fetches and checks it; the runtime is not fetched yet.
+   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not
+   * match, or do not convert one image to one image.
    */
   static async open(
     source: ModelSource | readonly ModelSource[],
@@ -73,7 +74,7 @@ export class PostProcessor {
   ): Promise<PostProcessor> {
     let post: PostProcessor | undefined;
     const onFallback = (reason: string): void => {
-      // The next picture is made anew, even of the same frame.
+      // The next image is computed again, even for the same frame.
       if (post) post.#forget();
       options.onFallback?.(reason);
     };
@@ -86,22 +87,22 @@ export class PostProcessor {
     }
   }
 
-  /** All models, in the order in which they run. */
+  /** All models, in execution order. */
   get models(): readonly GeneratorModel[] {
     return this.#chain.models;
   }
 
-  /** How it runs; undefined before the first run. */
+  /** Session kind; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#chain.kind;
   }
 
-  /** True from a request until the runtime is ready for the next: meanwhile the image handed in must stay as it is. */
+  /** Whether the runtime is still processing: until then the input image must not change. */
   get isBusy(): boolean {
     return this.#loop.isBusy;
   }
 
-  /** True if another run of the same image may still change what is made of it. */
+  /** Whether another run of the same image may still change the result. */
   get isConverging(): boolean {
     return this.#shown !== undefined && this.#keepsState && this.#repeats < MOST_REPEATS;
   }
@@ -111,16 +112,16 @@ export class PostProcessor {
     return this.#loop.milliseconds;
   }
 
-  /** Fulfils, and never rejects, when no run is on its way. */
+  /** Resolves, and never rejects, when no run is in progress. */
   get idle(): Promise<void> {
     return this.#loop.idle;
   }
 
   /**
-   * Asks for the image made of an image. A request that has not started yet is replaced; one whose inputs are those of the last run
-   * is not run, but 32 times by models that keep a state: they converge.
-   * @param picture for {@link input}; its `version` tells one content from another.
-   * @throws GaussianSplatError `argument/value` if the image or the state does not fit the model.
+   * Requests the processed image. A request that has not started yet is replaced; one with the inputs of the last run
+   * is skipped, but models with state run it 32 times, until they converge.
+   * @param picture Image for {@link input}; its `version` identifies its content.
+   * @throws GaussianSplatError `argument/value` if the image or the state does not match the model.
    */
   request(picture: GpuTensor, state: GeneratorState = {}): void {
     if (this.#loop.isClosed) return;
@@ -128,7 +129,7 @@ export class PostProcessor {
     this.#loop.request({ inputs: this.#chain.bind({ ...state, pictures }) });
   }
 
-  /** Ends it: a run on its way has no effect any more. */
+  /** Closes it: a run in progress has no effect any more. */
   close(): void {
     this.#loop.close();
     this.#chain.release(this.#loop.idle);
@@ -138,7 +139,7 @@ export class PostProcessor {
     return this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false;
   }
 
-  /** What such a model makes of one image changes from run to run. */
+  /** Models with state give different results for one image from run to run. */
   get #keepsState(): boolean {
     return this.models.some(({ contract }) => Object.values(contract.inputs).some(({ role }) => role === 'state'));
   }

@@ -1,18 +1,21 @@
-/** Runs whose work the GPU may not have finished before another one starts: one is computed while the next is recorded. */
+/**
+ * Maximum number of runs that the GPU may not have finished when another one starts: one executes while the next is
+ * encoded.
+ */
 const MAX_IN_FLIGHT = 2;
-/** A run that keeps the GPU for longer than this, ms, is waited for: frames that are drawn meanwhile stand behind it in the queue. */
+/** A run that keeps the GPU for longer than this, ms, is awaited, because frames queue behind it. */
 const SLOW_RUN_MS = 50;
 
 export interface RunLoopOptions<RunRequest> {
   readonly queue: GPUQueue;
-  /** Whether there is anything to do for a wish. */
+  /** Whether a request requires a run. */
   readonly isDue: (request: RunRequest) => boolean;
-  /** Fulfils once the work is submitted. */
+  /** Resolves once the work is submitted. */
   readonly run: (request: RunRequest) => Promise<void>;
   readonly onError: (error: unknown) => void;
 }
 
-/** Runs for what was asked last, as fast as runs finish and never faster: no backlog of calls, and none on the GPU. */
+/** Runs the latest request, as fast as runs finish and never faster: neither calls nor GPU work queue up. */
 export class RunLoop<RunRequest> {
   readonly #options: RunLoopOptions<RunRequest>;
   readonly #unfinished: Promise<unknown>[] = [];
@@ -39,12 +42,12 @@ export class RunLoop<RunRequest> {
     return this.#milliseconds;
   }
 
-  /** Fulfils, and never rejects, when no run is on its way. */
+  /** Resolves, and never rejects, when no run is in progress. */
   get idle(): Promise<void> {
     return this.#running ?? Promise.resolve();
   }
 
-  /** Returns at once; a wish that has not started yet is replaced. */
+  /** Returns at once; a request that has not started yet is replaced. */
   request(request: RunRequest): void {
     if (this.#isClosed) return;
     this.#request = request;
@@ -57,7 +60,7 @@ export class RunLoop<RunRequest> {
   }
 
   async #work(): Promise<void> {
-    // So that requests of the same task are one.
+    // Merges the requests of one task.
     await Promise.resolve();
     try {
       for (let request = this.#take(); request !== undefined; request = this.#take()) {
@@ -68,7 +71,7 @@ export class RunLoop<RunRequest> {
         }
       }
     } finally {
-      // At once: what is asked for a microtask later needs work of its own.
+      // Set synchronously: a request one microtask later needs a new loop.
       this.#running = undefined;
     }
   }
@@ -85,7 +88,7 @@ export class RunLoop<RunRequest> {
     if (!this.#isClosed) await this.#waitForRoom(start);
   }
 
-  /** A lost device finishes nothing, and is reported elsewhere. */
+  /** A lost device never finishes, and is reported by other code. */
   async #waitForRoom(start: number): Promise<void> {
     const submitted = performance.now();
     const finished = this.#options.queue.onSubmittedWorkDone().then(

@@ -8,13 +8,13 @@ export interface PlacedGaussians extends HostedGaussians<DynamicGaussians> {
   readonly placement: Placement;
 }
 
-/** A scene of three.js, as `@gaussian-splat/three` draws it. */
+/** A three.js scene for `@gaussian-splat/three`. */
 export interface ThreeScene {
   readonly isObject3D: true;
   add(...objects: never[]): unknown;
 }
 
-/** Of `@gaussian-splat/renderer`, which is fetched for the first model in a world. */
+/** Host of `@gaussian-splat/renderer`, which is loaded for the first model in a world. */
 const worldHost = {
   accepts: (scene: unknown): scene is World =>
     typeof scene === 'object' && scene !== null && 'placements' in scene && 'add' in scene && 'remove' in scene,
@@ -36,8 +36,8 @@ const worldHost = {
 };
 
 /**
- * Gaussians in a scene of any known renderer.
- * @throws GaussianSplatError `argument/value` for a scene that no renderer draws.
+ * Adds Gaussians to a scene of any registered renderer.
+ * @throws GaussianSplatError `argument/value` for a scene without a renderer.
  */
 export function receiveGaussians(
   scene: unknown,

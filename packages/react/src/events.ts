@@ -1,7 +1,7 @@
 import type { GaussianSplatEventMap } from '@gaussian-splat/element';
 import type { EventName } from '@lit/react';
 
-/** Which event a handler is for. Where React has a name for the event's handler, it is that one. */
+/** Event of each handler. The handler has React's name for the event, if there is one. */
 const EVENTS = {
   onLoad: 'load',
   onProgress: 'progress',
@@ -44,14 +44,14 @@ export type HandlerName = keyof typeof EVENTS;
 
 type EventOf<Name extends HandlerName> = GaussianSplatEventMap[(typeof EVENTS)[Name]];
 
-/** The handlers as the wrapper takes them. */
+/** The handlers in the format of the wrapper. */
 export type Handlers = { readonly [Name in HandlerName]: EventName<EventOf<Name>> };
 
-/** The handlers as an app writes them, each with its event's own type. */
+/** The handlers in the format of apps, each with its event's own type. */
 export type Listeners = { [Name in HandlerName]?: (event: EventOf<Name>) => void };
 
 /**
- * React keeps `onLoad`, `onError`, `onTimeUpdate`, `onPlay` and their like to itself on custom elements, where they never fire; these handlers
- * listen to the element.
+ * React reserves `onLoad`, `onError`, `onTimeUpdate`, `onPlay` and similar names on custom elements, but never calls
+ * them; these handlers listen to the element.
  */
 export const HANDLERS = EVENTS as unknown as Handlers;

@@ -9,7 +9,10 @@ import { HANDLERS, type Listeners } from './events.js';
 export type { HandlerName, Handlers, Listeners } from './events.js';
 export type { GaussianSplatElement } from '@gaussian-splat/element';
 
-/** What {@link GaussianSplat} takes: the element's properties, its events' handlers, what React gives every tag, and `ref`. */
+/**
+ * Props of {@link GaussianSplat}: the element's properties, handlers of its events, React's common attributes, and
+ * `ref`.
+ */
 export type GaussianSplatProps = Omit<
   React.HTMLAttributes<GaussianSplatElement>,
   keyof Listeners | keyof SettableProperties

@@ -1,6 +1,7 @@
 /**
- * Types of the bare tags `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in JSX: `import type {} from '@gaussian-splat/react/jsx'`. React sets its properties; of its
- * events only those with handlers in small letters arrive (`onload`, `oncamera-change`), so that no other name is taken.
+ * Types of the bare tags `<gaussian-splat>`, `<splat-scene>`, `<splat-mesh>` and `<splat-cut>` in JSX: `import type {}
+ * from '@gaussian-splat/react/jsx'`. React sets properties; of the events only those with lower-case handlers work
+ * (`onload`, `oncamera-change`), so only these names are declared.
  */
 import type { GaussianSplatElement, GaussianSplatEventMap, SettableProperties } from '@gaussian-splat/element';
 import type * as React from 'react';
@@ -27,7 +28,7 @@ type Props<E, Settable, Events = ChildEventMap> = Omit<
   SmallListeners<Events>;
 
 declare module 'react' {
-  // The way to tell React of a tag is to add it to its own namespace.
+  // Extending React's own namespace is the way to declare a tag.
   // eslint-disable-next-line @typescript-eslint/no-namespace
   namespace JSX {
     interface IntrinsicElements {

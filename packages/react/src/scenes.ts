@@ -39,7 +39,7 @@ type ChildHandler = keyof typeof EVENTS;
 type EventOf<Name extends ChildHandler> = ChildEventMap[(typeof EVENTS)[Name]];
 type ChildListeners = { [Name in ChildHandler]?: (event: EventOf<Name>) => void };
 
-/** What a child takes: its element's properties, handlers of its own events, what React gives every tag, and `ref`. */
+/** Props of a child: its element's properties, handlers of its own events, React's common attributes, and `ref`. */
 type ChildProps<E, Settable> = Omit<React.HTMLAttributes<E>, ChildHandler | keyof Settable> &
   ChildListeners &
   Settable &
@@ -78,7 +78,7 @@ export type SplatCutProps = Omit<React.HTMLAttributes<SplatCutElement>, keyof Se
   SettableCutProperties &
   React.RefAttributes<SplatCutElement>;
 
-/** A part of space in which splats are hidden or changed: `<SplatCut shape="plane" position={[0, 0.8, 0]} />`. */
+/** A region of space in which splats are hidden or changed: `<SplatCut shape="plane" position={[0, 0.8, 0]} />`. */
 export const SplatCut: React.ForwardRefExoticComponent<SplatCutProps> = /* @__PURE__ */ createComponent({
   react: React,
   events: {},

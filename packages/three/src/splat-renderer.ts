@@ -29,14 +29,15 @@ import { generatedSplatsHost } from './generated-splats.js';
 import { SplatWorld } from './splat-world.js';
 
 export interface SplatRendererOptions {
-  /** How frames are drawn: `settings(…)` of `@gaussian-splat/renderer`. */
+  /** Settings of frames: `settings(…)` of `@gaussian-splat/renderer`. */
   readonly settings?: FrameSettings;
-  /** Called when a frame that was drawn lacked splats for want of room. The next frame has the room: draw it. */
+  /** Called when a drawn frame lacked splats because of the buffers' capacity. The next frame has enough: draw it. */
   readonly onIncomplete?: () => void;
 }
 
 /**
- * Draws a three.js scene with the splats in it: each {@link SplatScene} is hidden by meshes in front of it, and hides those behind it.
+ * Draws a three.js scene with the splats in it: each {@link SplatScene} is hidden by meshes in front of it, and hides
+ * those behind it.
  *
  * ```ts
  * const renderer = new WebGPURenderer({ canvas });
@@ -45,7 +46,7 @@ export interface SplatRendererOptions {
  * renderer.setAnimationLoop(() => splats.render(scene, camera));
  * ```
  *
- * Transparent meshes are drawn before the splats. Memory is kept for each camera: {@link dispose} frees it.
+ * Transparent meshes are drawn before the splats. Memory is allocated for each camera: {@link dispose} frees it.
  */
 export class SplatRenderer {
   readonly #renderer: WebGPURenderer;
@@ -60,7 +61,7 @@ export class SplatRenderer {
   /** The meshes with tone mapping, and the splats. */
   #mapped: { readonly picture: Picture; readonly map: Quad; readonly curve: ToneMapping } | undefined;
 
-  /** @throws GaussianSplatError `argument/value` for a renderer that is not initialised, or does not draw with WebGPU. */
+  /** @throws GaussianSplatError `argument/value` for a renderer that is not initialized, or does not use WebGPU. */
   constructor(renderer: WebGPURenderer, options: SplatRendererOptions = {}) {
     const { device, isWebGPUBackend = false } = renderer.backend;
     if (!isWebGPUBackend || !device)
@@ -78,8 +79,9 @@ export class SplatRenderer {
   }
 
   /**
-   * Draws meshes and splats to where the renderer draws: a render target, or the canvas with its tone mapping and color space. Tone mapping is that of the meshes: splats are
-   * captured with a tone curve in their colors.
+   * Draws meshes and splats to the renderer's current target: a render target, or the canvas with its tone mapping and
+   * color space. Tone mapping applies only to the meshes, because the colors of captured splats already include a tone
+   * curve.
    */
   render(scene: Object3D, camera: Camera): void {
     const renderer = this.#renderer;
@@ -97,9 +99,11 @@ export class SplatRenderer {
   }
 
   /**
-   * Draws the splats alone over what a render target holds, for your own pipelines: `renderer.setRenderTarget(target)`, `renderer.render(scene, camera)`, then this. The target
-   * holds linear light, one sample a pixel, and has a `depthTexture`, or splats hide all meshes.
-   * @throws GaussianSplatError `argument/value` for another target; `argument/camera` for a camera with a skewed projection.
+   * Draws only the splats over the content of a render target, for your own pipelines: call
+   * `renderer.setRenderTarget(target)`, `renderer.render(scene, camera)`, then this. The target must hold linear light
+   * with one sample per pixel, and a `depthTexture`; without it splats hide all meshes.
+   * @throws GaussianSplatError `argument/value` for another target; `argument/camera` for a camera with a skewed
+   * projection.
    */
   draw(scene: Object3D, camera: Camera, target: RenderTarget): void {
     this.#drawInto(scene, camera, target, target.depthTexture);
@@ -119,8 +123,10 @@ export class SplatRenderer {
   }
 
   /**
-   * The state that a generator needs if its contract has inputs for the camera: `models.runGenerators({ ...splats.stateOf(camera, model), timeSeconds })`.
-   * @param model the object that shows it: a generator sees the camera from its own frame. Default: it stands at the origin.
+   * Returns the state for a generator whose contract has camera inputs: `models.runGenerators({
+   * ...splats.stateOf(camera, model), timeSeconds })`.
+   * @param model Object that shows it, because a generator receives the camera in its own coordinates. Default: an
+   * object at the origin.
    * @throws GaussianSplatError `argument/camera` for a camera with a skewed projection.
    */
   stateOf(camera: Camera, model?: Object3D): { readonly camera: SplatCamera } {
@@ -131,7 +137,7 @@ export class SplatRenderer {
     const place = toModel.multiply(camera.matrixWorld);
     const [position, turn] = [new Vector3(), new Quaternion()];
     place.decompose(position, turn, new Vector3());
-    // Lengths of the frame change with its scale, angles of the camera do not.
+    // Lengths scale with the object, but the angles of the camera do not.
     const view = place.compose(position, turn, new Vector3(1, 1, 1)).invert();
     const { x: width, y: height } = this.#renderer.getDrawingBufferSize(this.#size);
     const clipDepth = camera.coordinateSystem === WebGPUCoordinateSystem ? '0..1' : '-1..1';
@@ -140,7 +146,7 @@ export class SplatRenderer {
     };
   }
 
-  /** Frees the memory of a camera, or of all; what is drawn afterwards allocates anew. */
+  /** Frees the memory of a camera, or of all; later draws allocate it again. */
   dispose(camera?: Camera): void {
     for (const worlds of this.#worlds.values()) {
       for (const [own, { viewpoint }] of worlds) {
@@ -167,7 +173,7 @@ export class SplatRenderer {
     return world;
   }
 
-  /** Where a whole frame is drawn before it goes to the canvas. */
+  /** Intermediate target of a whole frame for the canvas. */
   #frameOf(): Picture {
     const { width, height } = this.#renderer.getRenderTarget() ?? drawingBuffer(this.#renderer, this.#size);
     this.#frame ??= pictureOf(new DepthTexture(width, height, FloatType));
@@ -175,7 +181,7 @@ export class SplatRenderer {
     return this.#frame;
   }
 
-  /** Draws a picture with a tone curve. */
+  /** Draws a frame with a tone curve. */
   #map(drawn: Picture, curve: ToneMapping): Picture {
     if (this.#mapped?.curve !== curve) {
       this.#forgetMapped();
@@ -224,7 +230,7 @@ interface Quad {
   readonly quad: QuadMesh;
 }
 
-/** A frame in linear light, and what copies it. */
+/** A frame in linear light, and the material that copies it. */
 interface Picture {
   readonly target: RenderTarget;
   readonly copy: Quad;

@@ -4,7 +4,7 @@ import { Object3D } from 'three/webgpu';
 export interface SplatSceneOptions {
   /** Factor of the opacity of each splat, 0 to 1. Default: 1. */
   readonly opacity?: number;
-  /** Only splats whose centres lie in this box, in the scene's own frame, are drawn. */
+  /** Only splats whose centers lie in this box, in the scene's own coordinates, are drawn. */
   readonly crop?: Box;
 }
 
@@ -19,7 +19,7 @@ export interface SplatSceneOptions {
  */
 export class SplatScene extends Object3D {
   readonly isSplatScene = true;
-  /** What is drawn. It belongs to its maker. */
+  /** The drawn Gaussians, which belong to their creator. */
   gaussians: GaussianScene;
   opacity: number;
   crop: Box | undefined;
@@ -33,5 +33,5 @@ export class SplatScene extends Object3D {
   }
 }
 
-/** Whether an object is a {@link SplatScene}, of whichever copy of this package. */
+/** Whether an object is a {@link SplatScene}, from any copy of this package. */
 export const isSplatScene = (object: object): object is SplatScene => 'isSplatScene' in object;

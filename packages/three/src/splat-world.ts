@@ -2,7 +2,7 @@ import { Viewpoint, World, type FrameSettings, type Placement } from '@gaussian-
 import type { Camera, Object3D } from 'three/webgpu';
 import { isSplatScene, type SplatScene } from './splat-scene.js';
 
-/** The splats of a three.js scene as one camera sees them. */
+/** The splats of a three.js scene for one camera. */
 export class SplatWorld {
   readonly viewpoint: Viewpoint;
   readonly #world = new World();
@@ -12,12 +12,12 @@ export class SplatWorld {
     this.viewpoint = new Viewpoint(device, this.#world, { settings, onIncomplete });
   }
 
-  /** True if there is something to draw. */
+  /** Whether there is something to draw. */
   get isEmpty(): boolean {
     return !this.#world.placements.some(({ visible }) => visible);
   }
 
-  /** Takes over what the scene graph says: which splats there are, where, and which are hidden. */
+  /** Synchronizes with the scene graph: the set of splats, their transforms and their visibility. */
   follow(root: Object3D, camera: Camera): void {
     const seen = new Set<SplatScene>();
     root.traverseVisible((object) => {
@@ -26,7 +26,7 @@ export class SplatWorld {
     for (const splats of seen) this.#place(splats);
     for (const [splats, placement] of this.#placements) {
       if (seen.has(splats)) continue;
-      // Hidden ones, too: what is not visible holds no room.
+      // Hidden ones are removed, too, so that they use no capacity.
       this.#world.remove(placement);
       this.#placements.delete(splats);
     }
@@ -45,6 +45,6 @@ export class SplatWorld {
   }
 }
 
-/** three.js keeps matrices by columns. */
+/** three.js stores matrices column-major. */
 const rowMajor = (elements: readonly number[]): number[] =>
   elements.map((_, k) => elements[4 * (k % 4) + Math.floor(k / 4)]);

@@ -1,21 +1,25 @@
 /**
- * Dawn's Node module asks the driver for finished work from one `setImmediate` to the next, for as long as any is under way: that keeps a processor busy, and where the GPU
- * is that same processor (SwiftShader) it was found to take a third to a half of all processor time. After half a millisecond of it, it may ask once a millisecond.
+ * Dawn's Node module polls the driver in consecutive `setImmediate` calls while any work is in progress. This keeps a
+ * CPU core busy, and with a software adapter (SwiftShader) took a third to a half of all CPU time. After half a
+ * millisecond, polling is limited to once a millisecond.
  */
 const EAGER_MS = 0.5;
 const PAUSE_MS = 1;
 
-/** Compiled code: nothing else in a program of ours hands such a function to `setImmediate`, and a bound one would only come a millisecond late. */
+/**
+ * Detects native functions: nothing else in our programs passes one to `setImmediate`, and a bound function would only
+ * be called a millisecond later.
+ */
 const isNative = (callback) => /\{\s*\[native code\]\s*\}$/.test(Function.prototype.toString.call(callback));
 
-/** Must come before Dawn is made. */
+/** Must be called before Dawn is created. */
 export function calmPolling() {
   const soon = globalThis.setImmediate;
   let isAsking = false;
   let since = 0;
   const calm = (callback, ...args) => {
     if (typeof callback !== 'function' || !isNative(callback)) return soon(callback, ...args);
-    // Who asks again, does so while it is being called.
+    // A polling function schedules its next call during a call.
     if (!isAsking) since = performance.now();
     const ask = () => {
       isAsking = true;
@@ -27,6 +31,6 @@ export function calmPolling() {
     };
     return performance.now() - since < EAGER_MS ? soon(ask) : setTimeout(ask, PAUSE_MS);
   };
-  // With `util.promisify`'s form of it.
+  // Keeps the variant for `util.promisify`.
   globalThis.setImmediate = Object.defineProperties(calm, Object.getOwnPropertyDescriptors(soon));
 }

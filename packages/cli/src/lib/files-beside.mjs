@@ -1,12 +1,13 @@
 import { existsSync, readFileSync, realpathSync } from 'node:fs';
 import { basename, dirname, extname, join, posix, sep } from 'node:path';
 
-/** Where descriptions in JSON name files: SOG, streamed SOG, pages of detail, sequences. */
+/** Keys of JSON descriptions that contain file names: SOG, streamed SOG, LOD pages, sequences. */
 const KEYS = new Set(['files', 'filenames', 'environment', 'file', 'frames']);
 
 /**
- * Files that a scene or a model needs beside it, as paths from its folder: buffers and images of a glTF, weights and contract of a model, what a description in JSON names and what that
- * names. `missing`: those that are not there or lie outside of the folder, and why. A file that is damaged names none: the page says what is wrong. Needs built packages.
+ * Companion files of a scene or a model, as paths from its folder: buffers and images of a glTF, weights and contract
+ * of a model, files in a JSON description and in nested ones. `missing`: files that do not exist or lie outside the
+ * folder, with the reason. A damaged file has none: the page reports the fault. Requires built packages.
  */
 export async function filesBeside(scene) {
   const { isInside } = await import('@gaussian-splat/core/contract');
@@ -30,7 +31,7 @@ export async function filesBeside(scene) {
   return { found: [...found], missing: [...missing].map(([file, why]) => `${file} (${why})`) };
 }
 
-/** Archives and clones of strangers may have links to any file of this machine. */
+/** Untrusted archives and clones may contain links to any file of this machine. */
 const leadsOut = (scene, file) => {
   const folder = realpathSync(dirname(scene));
   return !realpathSync(join(folder, file)).startsWith(folder.endsWith(sep) ? folder : folder + sep);
@@ -38,7 +39,7 @@ const leadsOut = (scene, file) => {
 
 const isJson = (path) => extname(path).toLowerCase() === '.json';
 
-/** A model may have none: it is no name that is missing. */
+/** A model may have none, so it is not reported as missing. */
 const sidecarOf = (scene, { sidecarName }) =>
   extname(scene).toLowerCase() === '.onnx' ? sidecarName(basename(scene)) : undefined;
 
@@ -50,7 +51,7 @@ async function namedBy(file) {
 async function buffersOf(file) {
   const { buffers = [], images = [] } = JSON.parse(readFileSync(file, 'utf8'));
   return [...buffers, ...images].flatMap(({ uri }) =>
-    // What follows the path is for servers.
+    // A query is for servers.
     uri === undefined || /^[a-z]+:/i.test(uri) ? [] : [decodeURIComponent(uri.replace(/[?#].*$/, ''))],
   );
 }

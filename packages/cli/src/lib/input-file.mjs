@@ -1,11 +1,14 @@
-/** Files that commands are given. */
+/** Input files of commands. */
 import { readFileSync } from 'node:fs';
 import { open } from 'node:fs/promises';
 
-/** So much is asked for at once: threads of Node share the work, and none is asked for more than it can read. */
+/** Bytes of one read: Node's thread pool then shares the work, and no read exceeds its limit. */
 const PIECE = 1 << 26;
 
-/** A file's bytes, read while the caller does something else: many times as fast as `readFile` of `node:fs/promises`, which asks for half a megabyte after another. */
+/**
+ * Reads a file's bytes asynchronously: many times as fast as `readFile` of `node:fs/promises`, which reads half a
+ * megabyte at a time.
+ */
 export async function readWhole(path) {
   const file = await open(path);
   try {
@@ -19,7 +22,7 @@ export async function readWhole(path) {
   }
 }
 
-/** Reads as many bytes as there is room for. */
+/** Fills the array from a file. */
 async function fill(file, bytes, from) {
   for (let at = 0; at < bytes.length;) {
     const { bytesRead } = await file.read(bytes, at, bytes.length - at, from + at);
@@ -28,7 +31,7 @@ async function fill(file, bytes, from) {
   }
 }
 
-/** What a JSON file says, with or without the byte-order mark that some editors and shells put before it. */
+/** Parses a JSON file, with or without the byte-order mark that some editors and shells add. */
 export function readJson(path) {
   return JSON.parse(readFileSync(path, 'utf8').replace(/^\ufeff/, ''));
 }

@@ -5,12 +5,13 @@ import { calmPolling } from './calm-polling.mjs';
 Object.assign(globalThis, globals);
 calmPolling();
 
-/** Dawn, by its options. It must not be collected while a device of it lives. */
+/** Dawn instances by options. They must not be garbage-collected while one of their devices lives. */
 const made = new Map();
 
 /**
- * An adapter, or an error that says what is missing.
- * @param options.isTrusted leaves out Dawn's own checks, for commands that do what tests do with them. A check of an indirect dispatch takes longer than most of these dispatches do.
+ * Returns an adapter, or throws an error that describes the missing part.
+ * @param options.isTrusted Disables Dawn's own validation, for commands whose work is tested with it. Validating an
+ * indirect dispatch takes longer than most of these dispatches.
  */
 export async function requestNodeAdapter({ isTrusted = false } = {}) {
   const options = [

@@ -1,8 +1,8 @@
-/** Files that a command writes: never half of one, and never in place of one that it reads. */
+/** Output files of commands: never partial, and never over an input file. */
 import { accessSync, constants, existsSync, realpathSync, renameSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname } from 'node:path';
 
-/** Whether two paths lead to one file, by links too. */
+/** Whether two paths refer to one file, also through links. */
 export function isSameFile(a, b) {
   if (a === b) return true;
   if (!existsSync(a) || !existsSync(b)) return false;
@@ -10,7 +10,7 @@ export function isSameFile(a, b) {
   return one.dev === other.dev && one.ino === other.ino;
 }
 
-/** What stands in the way of writing a file, for people, or undefined: to be said before the work. */
+/** Describes why a file cannot be written, or returns undefined, to be reported before the work. */
 export function obstacleTo(path) {
   const folder = dirname(path);
   if (!existsSync(folder)) return `the folder ${folder} does not exist`;
@@ -27,10 +27,10 @@ function mayWrite(path) {
   }
 }
 
-/** Writes a file whole or not at all: what is there stays until all of the new one is on the disk. */
+/** Writes a file completely or not at all: an existing file stays until the new one is on the disk. */
 export function writeWhole(path, content) {
   const target = existsSync(path) ? realpathSync(path) : path;
-  // Neither pipes and devices are replaced, nor a file in a folder that nothing can be added to.
+  // Pipes, devices, and files in read-only folders are written directly.
   if (existsSync(target) && !(statSync(target).isFile() && mayWrite(dirname(target))))
     return writeFileSync(target, content);
   const part = `${target}.${process.pid}.part`;

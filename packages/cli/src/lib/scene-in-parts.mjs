@@ -4,9 +4,9 @@ import { HEADER_BYTES, splatRanges } from '@gaussian-splat/formats';
 import { readInThread } from './scene-thread.mjs';
 
 /**
- * Starts to read a scene file as a cloud in shared memory, by other threads: by all of the pool where its splats can be read apart, as a large PLY's can. Once they have their work, it
- * goes on whatever keeps this one busy.
- * @returns {Promise<{cloud: Promise<GaussianCloud>}>} both reject as `readScene` does, or with the error of the file system
+ * Starts to read a scene file as a cloud in shared memory on other threads: on all threads of the pool if its splats
+ * can be read in ranges, as those of a large PLY. The work then continues even if this thread is busy.
+ * @returns {Promise<{cloud: Promise<GaussianCloud>}>} Both reject as `readScene` does, or with a file system error.
  */
 export async function startReading(path, pool) {
   const found = pool.size > 1 ? await rangesOf(path) : undefined;
@@ -21,7 +21,10 @@ function readRows(path, { head, ranges }, parts, to, pool) {
   return pool.run('readFilePart', inputs);
 }
 
-/** Where the rows of a file lie that are all there, and what comes before them. Whatever is wrong with a file is said by those who read it whole. */
+/**
+ * Location of the rows of a complete file, and the bytes before them. Faults of a file are reported when it is read as
+ * a whole.
+ */
 async function rangesOf(path) {
   const { beginning, size } = readBeginning(path);
   const ranges = await splatRanges(beginning, path).catch(() => undefined);

@@ -1,11 +1,14 @@
-/** Reads a scene file in a thread of its own: see {@link readInThread}. */
+/** Reads a scene file on a separate thread: see {@link readInThread}. */
 import { dirname, join } from 'node:path';
 import { isMainThread, parentPort, Worker, workerData } from 'node:worker_threads';
 import { readScene } from '@gaussian-splat/formats';
 import { readWhole } from './input-file.mjs';
 import { packError, unpackError } from './thread-errors.mjs';
 
-/** A scene file as a cloud in shared memory, read while the caller does something else. Rejects as `readScene` does, or with the error of the file system. */
+/**
+ * Reads a scene file on another thread as a cloud in shared memory. Rejects as `readScene` does, or with a file system
+ * error.
+ */
 export function readInThread(path) {
   return new Promise((resolve, reject) => {
     const thread = new Worker(new URL(import.meta.url), { workerData: path });
@@ -27,7 +30,7 @@ async function answer(path) {
   }
 }
 
-/** The same cloud in memory that threads share. */
+/** Copies a cloud to memory that threads share. */
 function shared(cloud) {
   const entries = Object.entries(cloud).map(([name, value]) => {
     if (!(value instanceof Float32Array)) return [name, value];

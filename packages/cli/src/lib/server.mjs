@@ -1,4 +1,7 @@
-/** A static file server for the demo and the tests: right MIME types, byte ranges, no caching, nothing outside its root. */
+/**
+ * A static file server for the demo and the tests: correct MIME types, byte ranges, no caching, nothing outside its
+ * root.
+ */
 import { createReadStream, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { extname, join, normalize, sep } from 'node:path';
@@ -21,7 +24,7 @@ const TYPES = {
 
 /**
  * Serves the folders of `mounts` (URL prefix to folder, the longest prefix wins).
- * @returns the listening server; its address says which port was taken.
+ * @returns The listening server; its address contains the port.
  */
 export function serve(mounts, { port = 0, host = '127.0.0.1', headers = {} } = {}) {
   const prefixes = Object.keys(mounts).sort((a, b) => b.length - a.length);
@@ -80,6 +83,6 @@ function sendFile(request, response, { path, size }, extraHeaders) {
   if (range) headers['content-range'] = `bytes ${start}-${end}/${size}`;
   response.writeHead(range ? 206 : 200, { ...headers, 'content-length': end - start + 1 });
   if (request.method === 'HEAD' || size === 0) response.end();
-  // A request that is given up closes its file.
+  // An aborted request closes its file.
   else pipeline(createReadStream(path, { start, end }), response, () => {});
 }

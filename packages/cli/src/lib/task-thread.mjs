@@ -1,4 +1,4 @@
-/** A thread of a `ThreadPool`: does one task after another. */
+/** A thread of a `ThreadPool`: runs one task after another. */
 import { closeSync, openSync, readSync } from 'node:fs';
 import { parentPort } from 'node:worker_threads';
 import { readBlocks, tasks } from '@gaussian-splat/economise/parts';
@@ -19,8 +19,9 @@ async function answer({ name, input }) {
 parentPort.on('message', (task) => (last = last.then(() => answer(task))));
 
 /**
- * The task of scene-in-parts.mjs: reads some rows of a PLY file into columns. What is read at once is a file of its own: the header, and then some rows.
- * @param head the file up to its first row
+ * The task of scene-in-parts.mjs: reads some rows of a PLY file into columns. Each read is treated as a separate file:
+ * the header, followed by some rows.
+ * @param head The file up to its first row.
  */
 async function readFilePart({ path, head, rowBytes, part, to }) {
   const file = openSync(path);

@@ -1,4 +1,4 @@
-/** Errors on their way from a thread: structured clone drops their classes and fields. */
+/** Serializes errors of threads, because structured clone drops their classes and fields. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 
 /** An error as plain data. */
@@ -7,7 +7,7 @@ export function packError(error) {
   return error instanceof GaussianSplatError ? { data: error.toData() } : { message, code };
 }
 
-/** The error that was packed. */
+/** Restores a serialized error. */
 export function unpackError({ data, message, code }) {
   return data ? GaussianSplatError.fromData(data) : Object.assign(new Error(message), { code });
 }

@@ -1,32 +1,41 @@
-/** Threads that do the tasks of `@gaussian-splat/economise`, in memory that they share: a `TaskPool`, see packages/economise/src/parts/task-pool.ts. */
+/**
+ * Threads for the tasks of `@gaussian-splat/economise`, with shared memory: a `TaskPool`, see
+ * packages/economise/src/parts/task-pool.ts.
+ */
 import { existsSync } from 'node:fs';
 import { availableParallelism } from 'node:os';
 import { fileURLToPath } from 'node:url';
 import { Worker } from 'node:worker_threads';
 import { unpackError } from './thread-errors.mjs';
 
-/** More threads have little to gain: most of the work is moving memory. */
+/** Maximum number of threads: more hardly help, because most of the work is memory bound. */
 const MOST_THREADS = 16;
-/** One for each processor, up to so many. */
+/** One thread for each CPU core, up to the maximum. */
 export const usualThreads = () => Math.min(MOST_THREADS, availableParallelism());
 
-/** Fewer splats are done before threads are started and have run themselves in; measured on two cores, when starting took each a tenth of a second of a processor (a third of that now). */
+/**
+ * Smaller work is done before threads have started and been compiled; measured on two cores, when the start of each
+ * took a tenth of a second of CPU time (a third of that now).
+ */
 const LEAST_SPLATS = 1 << 18;
 
-/** The script of a thread, in one file: a thread that loads a hundred modules, as every one of sixteen does, takes five times as long to start. */
+/**
+ * The script of a thread as one file: loading a hundred modules, on each of sixteen threads, takes five times as long
+ * to start.
+ */
 const SOURCE = new URL('./task-thread.mjs', import.meta.url);
 const BUNDLE = new URL('../../../../.cache/threads/task-thread.mjs', import.meta.url);
 
-/** Where it is: what the last build made of it, else its source. */
+/** The bundle of the last build, else the source. */
 const threadScript = () => (existsSync(BUNDLE) ? BUNDLE : SOURCE);
 
 export class ThreadPool {
-  /** Each with the tasks that it has not answered yet, in their order. */
+  /** Threads with their pending tasks, in order. */
   #threads = [];
 
   /**
-   * @param size threads; they are started by the first tasks, or by `start`
-   * @param leastSplats that they are given work on
+   * @param size Number of threads; they are started by the first tasks, or by `start`.
+   * @param leastSplats Minimum number of splats for using them.
    */
   constructor(size = usualThreads(), leastSplats = LEAST_SPLATS) {
     this.size = size;
@@ -41,12 +50,12 @@ export class ThreadPool {
     return memory instanceof SharedArrayBuffer;
   }
 
-  /** Starts the threads ahead of the tasks that they will get. */
+  /** Starts the threads before their first tasks. */
   start() {
     while (this.#threads.length < this.size) this.#threads.push(new TaskThread());
   }
 
-  /** All tasks are handed out at once, so that they are done also while this thread is kept busy. */
+  /** All tasks are posted at once, so that they run even while this thread is busy. */
   async run(name, inputs) {
     this.start();
     const answers = inputs.map((input, k) => this.#threads[k % this.size].ask(name, input));
@@ -75,7 +84,7 @@ class TaskThread {
     const fail = (error) => this.#open.splice(0).forEach(({ reject }) => reject(error));
     this.#worker.on('error', fail);
     this.#worker.on('exit', () => fail(new Error('the thread ended before its task was done')));
-    // Threads without a task keep nobody waiting.
+    // Idle threads do not keep the process alive.
     this.#worker.unref();
   }
 
@@ -92,7 +101,7 @@ class TaskThread {
   }
 }
 
-/** Makes the script of a thread, once the packages are built. */
+/** Bundles the script of a thread, once the packages are built. */
 export async function bundleThreadScript() {
   const { build } = await import('esbuild');
   await build({

@@ -24,7 +24,7 @@ import { followedWithin } from './partial-curves.js';
 import { changesOfTracks } from './track-changes.js';
 import type { Tracks } from './tracks.js';
 
-/** A part of a group as it lies in the file. */
+/** A part of a group as stored in the file. */
 export interface WrittenClipPart {
   readonly splats: number;
   readonly planes: number;
@@ -33,7 +33,10 @@ export interface WrittenClipPart {
   readonly bytes: Uint8Array<ArrayBuffer>;
 }
 
-/** Some tracks of a group: their splats as a scene, and the curves that these follow, to be rounded as coarsely as is asked. */
+/**
+ * Some tracks of a group: their splats as a scene, and the curves of their motion, which can be quantized with any
+ * step.
+ */
 export class TrackedPart {
   readonly #scene: Uint8Array;
   readonly #cloud: GaussianCloud;
@@ -56,10 +59,10 @@ export class TrackedPart {
   }
 
   /**
-   * @param whole the splats of all tracks
-   * @param chosen the tracks of this part
-   * @param encoding how their scene is written
-   * @param finest steps below which motion will not be rounded
+   * @param whole The splats of all tracks.
+   * @param chosen The tracks of this part.
+   * @param encoding Encoding of their scene.
+   * @param finest Lower limits of the quantization steps of motion.
    */
   static async of(
     tracks: Tracks,
@@ -81,7 +84,8 @@ export class TrackedPart {
     const livesOf = (own: Uint16Array): Uint16Array => Uint16Array.from(order, (i) => own[chosen[i]]);
     const lives = { first: livesOf(tracks.lives.first), end: livesOf(tracks.lives.end) };
     const frames = tracks.frames.length;
-    // To what was written: what does not move has no motion, and what rounding makes of it is in the scene's share of the error.
+    // Relative to the written scene: static splats then have no motion, and rounding counts in the scene's fraction of
+    // the error.
     const find = (name: MovingName): Followed | undefined => {
       const changes = changesOfTracks(tracks, { cloud: source, placeOf }, name);
       const span = (row: number): readonly [number, number] => [
@@ -94,7 +98,7 @@ export class TrackedPart {
     return new TrackedPart(scene, cloud, lives, frames, found as Record<MovingName, Followed | undefined>);
   }
 
-  /** What is read of it where motion is rounded so. */
+  /** Returns the decoded content with these quantization steps of motion. */
   contentAt(steps: MotionSteps): ClipPartContent {
     const parts = Object.fromEntries(
       MOVING_NAMES.map((name) => {
@@ -127,7 +131,7 @@ export class TrackedPart {
   }
 }
 
-/** Numbers of the splats that a file has, in its order: formats keep the order that they get, or sort splats as packing does. */
+/** Indices of the splats in the order of a file: formats keep the given order, or sort splats as packing does. */
 function orderIn(read: GaussianCloud, given: GaussianCloud): Uint32Array {
   const orders = [Uint32Array.from({ length: given.count }, (_, i) => i), packedOrder(given)];
   const apart = orders.map((order) => {
@@ -139,7 +143,7 @@ function orderIn(read: GaussianCloud, given: GaussianCloud): Uint32Array {
   return orders[apart[0] <= apart[1] ? 0 : 1];
 }
 
-/** Without the curves that are followed by less, as a rule. */
+/** Drops the curves that splats follow by less, on average. */
 function strongest({ rows, frames, curves, shares }: Followed, least: number): Followed {
   const isStrong = shares.map((own) => {
     let sum = 0;

@@ -2,12 +2,12 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import type { Tracks } from './tracks.js';
 
-/** Splats of which one is in the coarse part: neighbours, so that no place is left out. */
+/** One of this many neighboring splats is in the coarse part, so that every region is represented. */
 export const COARSE_RUN = 8;
 
 /**
- * Divides tracks in two: those that give a coarse image alone, and all others.
- * @param cloud their splats
+ * Divides tracks into the coarse part, which gives an image on its own, and the rest.
+ * @param cloud Their splats.
  */
 export function coarseAndRest(cloud: GaussianCloud, { lives, frames }: Tracks): readonly Uint32Array[] {
   const order = packedOrder(cloud);

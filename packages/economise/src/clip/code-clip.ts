@@ -23,13 +23,18 @@ import { coarseAndRest } from './coarse-part.js';
 import { cloudOfTracks, followSplats, type Tracks } from './tracks.js';
 
 export interface CodeClipOptions extends Omit<CodeSequenceOptions, 'openFrame' | 'framesPerFile'> {
-  /** Reads a frame; frames need not have the same splats. */
+  /** Reads a frame; frames may have different splats. */
   readonly openFrame: (frame: number) => Promise<GaussianCloud>;
   readonly framesPerSecond: number;
   readonly framesPerGroup: number;
-  /** Megabits that a second takes at most, in any group; `worstDecibels` of the result says what that costs. Default: no limit. */
+  /**
+   * Upper limit of the bit rate of any group in megabits per second; `worstPsnr` of the result shows its cost. Default:
+   * no limit.
+   */
   readonly maxMbps?: number;
-  /** Rounding that is known, in place of one that is found by measurement: then there is no need of a device, and nothing is measured. */
+  /**
+   * Fixed quantization, instead of one that is found by measurement: then no device is needed, and nothing is measured.
+   */
   readonly rounding?: { readonly encoding: Encoding; readonly steps: MotionSteps };
 }
 
@@ -38,26 +43,29 @@ export interface CodedClip {
   /** Bytes until the first frame can be shown. */
   readonly firstBytes: number;
   readonly groups: number;
-  /** Splats of all groups, and those that some frames of their groups lack. */
+  /** Splats over all groups, and those that are missing in some frames of their groups. */
   readonly splats: number;
   readonly passing: number;
-  /** PSNR of all measured frames together, and of the worst view of them. */
+  /** PSNR of all measured frames together, and of their worst view. */
   readonly decibels: number;
   readonly worstDecibels: number;
 }
 
-/** Share of the error that scenes of groups make; motion adds the rest. */
+/** Fraction of the error that scenes of groups may use; motion uses the rest. */
 const SCENE_SHARE = 0.4;
 const MAX_TRIES = 5;
 const NEAR_ENOUGH = 0.85;
-/** Steps of motion may become so much finer than those that the first group has. */
+/** Maximum ratio between the first group's quantization steps of motion and finer ones. */
 const FINER = 16;
-/** Frames of a group that are measured, and views of each. */
+/** Measured frames of a group, as fractions of its duration, and views of each. */
 const JUDGED = [0.2, 0.75];
 const VIEWS = 2;
 const GROWTHS = [1, 1.25, 1.6, 2, 2.5];
 
-/** Codes frames of any splats as a clip. Rounding is as coarse as images of some frames, in held-out views, allow. */
+/**
+ * Encodes frames with arbitrary splats as a clip. Quantization is as coarse as images of some frames, in held-out
+ * views, allow.
+ */
 export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
   const coder = new ClipCoder(options);
   const { frameCount, framesPerGroup } = options;
@@ -66,7 +74,7 @@ export async function codeClip(options: CodeClipOptions): Promise<CodedClip> {
   return coder.finish();
 }
 
-/** What a group became, and the errors that it was found to have. */
+/** An encoded group, and its measured errors. */
 interface WrittenGroup {
   readonly frames: number;
   readonly parts: readonly WrittenClipPart[];
@@ -140,7 +148,7 @@ class ClipCoder {
     };
   }
 
-  /** The camera sees where splats are in the group that has most of them. */
+  /** Views are placed by the group with the most splats. */
   #note(frame: GaussianCloud, whole: GaussianCloud): void {
     if (whole.count <= this.#largest) return;
     this.#largest = whole.count;
@@ -155,7 +163,7 @@ class ClipCoder {
     };
   }
 
-  /** Steps of scenes, by a frame of the first group. */
+  /** Finds the quantization steps of scenes with a frame of the first group. */
   async #tune(cloud: GaussianCloud): Promise<Encoding> {
     const { device, encodeWebp, onStep = () => undefined } = this.#options;
     const judge = await judgeOf(device, cloud, 3, 1);
@@ -203,7 +211,10 @@ class ClipCoder {
     }
   }
 
-  /** Steps at which a frame of the first group reaches the target, and a byte saves the same error in all attributes. */
+  /**
+   * Finds the steps that reach the target in a frame of the first group, and at which a byte saves the same error in
+   * all attributes.
+   */
   async #findSteps(
     parts: readonly TrackedPart[],
     { frames }: Tracks,
@@ -250,7 +261,7 @@ const usualSteps = (cloud: GaussianCloud): MotionSteps => ({
 const bytesOf = ({ parts }: Pick<WrittenGroup, 'parts'>): number =>
   parts.reduce((sum, part) => sum + part.bytes.length, 0);
 
-/** A frame of a group, and what compares others with it. */
+/** A frame of a group, and the evaluator that compares others with it. */
 interface FrameJudge {
   readonly frame: number;
   readonly judge: GpuEvaluator;
@@ -272,7 +283,7 @@ async function errorsIn(judges: readonly FrameJudge[], parts: readonly ClipPartC
   return errors;
 }
 
-/** How much larger splats of the coarse part stand best for all. */
+/** Finds the enlargement with which splats of the coarse part represent all best. */
 async function growthIn({ judge, frame }: FrameJudge, [coarse]: readonly ClipPartContent[]): Promise<number> {
   const cloud = frameOf([coarse], frame);
   let [best, least] = [1, Infinity];

@@ -1,26 +1,29 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { PlaceGrid } from './place-grid.js';
 
-/** Differences of a match, each in the unit that makes them comparable; a pair of splats matches at {@link MOST_COST} or less. */
+/**
+ * Units that make the differences of a match comparable; a pair of splats matches at a cost of {@link MOST_COST} or
+ * less.
+ */
 const COLOR_UNIT = 0.25;
 const SIZE_UNIT = 0.5;
 const OPACITY_UNIT = 0.35;
 const SHAPE_UNIT = 0.3;
 const MOST_COST = 6;
-/** No better match is looked for. */
+/** A match below this cost ends the search. */
 const SURE = 0.01;
-/** The search radius, in typical distances between neighbours. */
+/** Search radius, in typical distances between neighbors. */
 const RADIUS = 3;
-/** Rounds in which splats whose best match was taken look for another. */
+/** Number of rounds: splats whose best match was taken search again in the next. */
 const ROUNDS = 3;
-/** Share of the splats of the same numbers that must match for numbers to be taken for names. */
+/** Fraction of splats with equal indices that must match for indices to identify splats. */
 const SAME_NUMBERS = 0.9;
-/** Passes in which those that found nothing look among those that are left, by the distances of these, and what a pair of them may cost. */
+/** Passes over the unmatched splats, with a radius from their own distances, and the maximum cost of their pairs. */
 const SPARSE_PASSES = 2;
 const SPARSE_COST = 2;
 const LEAST_SIZE = 1e-12;
 
-/** What splats are compared by. */
+/** Features for matching splats. */
 export interface Features {
   readonly count: number;
   /** [N, 3] in world units, relative to the origin of the sequence. */
@@ -51,7 +54,7 @@ export function featuresOf(cloud: GaussianCloud, origin: readonly number[]): Fea
   return { count, positions, looks };
 }
 
-/** Covariance of trace 1, which is the same whatever its axes are called. */
+/** Covariance scaled to trace 1, which does not depend on the order of the axes. */
 function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float32Array, at: number): void {
   const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
   const axes = [
@@ -72,9 +75,9 @@ function putShape({ rotations, scales }: GaussianCloud, i: number, looks: Float3
 }
 
 /**
- * Finds which splats of a frame are those of the frame before.
- * @param before whose positions are where its splats are expected in the next frame
- * @returns [splats of `next`] number in `before`, or -1 for a splat that is new
+ * Matches the splats of a frame with those of the previous one.
+ * @param before Its positions are those expected in the next frame.
+ * @returns [splats of `next`] index in `before`, or -1 for a new splat.
  */
 export function matchFrames(before: Features, next: Features): Int32Array {
   const grid = PlaceGrid.of(next.positions, next.count, RADIUS);
@@ -83,7 +86,7 @@ export function matchFrames(before: Features, next: Features): Int32Array {
   const found = new Int32Array(next.count).fill(-1);
   let looking: Uint32Array = Uint32Array.from({ length: before.count }, (_, i) => i);
   byPlace(before, next, { grid, looking, found, most: MOST_COST });
-  // What is fast and sparse, such as spray, is farther from where it was than others are from one another.
+  // Fast and sparse splats, such as spray, move farther than the typical distance of neighbors.
   for (let pass = 0; pass < SPARSE_PASSES; pass++) {
     const open = whichOf(found, (owner) => owner < 0);
     const isFound = new Uint8Array(before.count);
@@ -116,7 +119,7 @@ function featuresAt({ positions, looks }: Features, chosen: Uint32Array): Featur
   return { count: chosen.length, ...own };
 }
 
-/** What a match costs, or some number of at least `enough`. */
+/** Cost of a match, or any number of at least `enough`. */
 function costOf(a: Features, i: number, b: Features, j: number, unit: number, enough = Infinity): number {
   let cost = 0;
   for (let k = 0; k < 3; k++) cost += ((a.positions[3 * i + k] - b.positions[3 * j + k]) / unit) ** 2;
@@ -124,7 +127,7 @@ function costOf(a: Features, i: number, b: Features, j: number, unit: number, en
   return cost;
 }
 
-/** Where as many splats keep their numbers; undefined where numbers are no names. */
+/** Matches by index if enough splats keep theirs; undefined otherwise. */
 function byNumber(before: Features, next: Features, unit: number): Int32Array | undefined {
   if (before.count !== next.count) return undefined;
   const found = new Int32Array(next.count).fill(-1);
@@ -139,14 +142,14 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
 
 interface Search {
   readonly grid: PlaceGrid;
-  /** Splats of the frame before that look for theirs. */
+  /** Splats of the previous frame that search a match. */
   readonly looking: Uint32Array;
-  /** [splats of the next frame] the number before, or -1; written. */
+  /** [splats of the next frame] index in the previous one, or -1; written. */
   readonly found: Int32Array;
   readonly most: number;
 }
 
-/** The pairs that cost least: of those who want the same splat the nearest has it, and the others look again. */
+/** Finds the cheapest pairs: if several splats choose the same one, the nearest gets it, and the others search again. */
 function byPlace(before: Features, next: Features, { grid, found, most, ...search }: Search): void {
   const costs = new Float32Array(next.count);
   let { looking } = search;

@@ -1,25 +1,26 @@
 import { mainCurves } from '../motion/main-curves.js';
 import { followed, type Followed } from '../motion/write-motion.js';
 
-/** The frames of a row that count. */
+/** Range of valid frames of a row. */
 export type Span = (row: number) => readonly [first: number, end: number];
 
 const ROUNDS = 2;
-/** Curves at most that missing frames are found by. */
+/** Missing frames are predicted from at most this number of curves. */
 const MOST_CURVES = 10;
-/** Curves at most that a row with missing frames follows. A fit takes the third power of their number. */
+/** Maximum number of curves for a row with missing frames, because the cost of a fit grows with its third power. */
 const MOST_FITTED = 20;
-/** Share of the frames that are enough to tell a parabola. */
+/** Minimum fraction of valid frames for fitting a parabola. */
 const LONG = 0.3;
-/** Share of what rows do as a rule that is taken for noise at least: short lives are told from by no more. */
+/** Minimum noise, as a fraction of the typical power of rows: limits the weights that short lifetimes determine. */
 const LEAST_NOISE = 1e-6;
-/** Rows whose shares tell how much a curve is followed as a rule. */
+/** Sampled rows for the typical weight of each curve. */
 const SAMPLES = 4000;
 
 /**
- * The curves that rows follow most in the frames that count, and how much of each a row follows: in the other frames rows become what their curves go on with.
- * @param changes [rows, frames]; what does not count is overwritten
- * @param least see `leastCurve`
+ * Finds the curves that rows follow most in their valid frames, and their weights for each row; in the other frames
+ * rows are replaced by the continuation of the curves.
+ * @param changes [rows, frames]; invalid entries are overwritten.
+ * @param least See `leastCurve`.
  */
 export function followedWithin(changes: Float32Array, frames: number, span: Span, least: number): Followed {
   const rows = changes.length / frames;
@@ -64,14 +65,17 @@ const sumOf = (curves: readonly Float64Array[], shares: Float64Array, frame: num
   return sum;
 };
 
-/** Legendre's polynomials up to the second over the frames, each of root mean square 1, or about: what is thrown follows them. */
+/**
+ * Legendre polynomials up to degree two over the frames, each with a root mean square of about 1, because thrown
+ * objects follow them.
+ */
 function parabolas(frames: number): Float64Array[] {
   const of = (value: (x: number) => number): Float64Array =>
     Float64Array.from({ length: frames }, (_, f) => value((2 * f + 1) / frames - 1));
   return [of(() => 1), of((x) => Math.sqrt(3) * x), of((x) => Math.sqrt(5) * (1.5 * x * x - 0.5))];
 }
 
-/** Mean squares of how much rows follow each curve that have enough frames to tell. */
+/** Mean squared weight of each curve over rows with enough frames. */
 function longPowers(changes: Float32Array, frames: number, span: Span, curves: readonly Float64Array[]): number[] {
   const rows = changes.length / frames;
   const fit = new RowFit(
@@ -93,7 +97,7 @@ function longPowers(changes: Float32Array, frames: number, span: Span, curves: r
   return sums.map((sum) => sum / Math.max(1, used));
 }
 
-/** Mean squares of how much rows follow each curve. */
+/** Mean squared weight of each curve over the rows. */
 function powersOf(changes: Float32Array, frames: number, curves: readonly Float64Array[]): number[] {
   const rows = changes.length / frames;
   const stride = Math.max(1, Math.floor(rows / SAMPLES));
@@ -108,7 +112,7 @@ function powersOf(changes: Float32Array, frames: number, curves: readonly Float6
   });
 }
 
-/** Least squares of rows of which some frames count; curves that rows hardly follow as a rule are held near 0. */
+/** Least squares fit of rows with missing frames; the weights of unusual curves are regularized towards 0. */
 class RowFit {
   readonly #curves: readonly Float64Array[];
   readonly #weights: readonly number[];
@@ -124,7 +128,7 @@ class RowFit {
     this.#solution = new Float64Array(curves.length);
   }
 
-  /** How much a row follows each curve, in the frames from `first` on, before `end`. The array is used again. */
+  /** Weights of a row's curves, fitted to the frames from `first` on, before `end`. The array is reused. */
   of(row: Float32Array, first: number, end: number): Float64Array {
     const [curves, matrix, solution] = [this.#curves, this.#matrix, this.#solution];
     const size = curves.length;
@@ -143,7 +147,7 @@ class RowFit {
   }
 }
 
-/** Solves a symmetric positive system by Cholesky's factor, of which the lower triangle is given. */
+/** Solves a symmetric positive definite system with a Cholesky factorization; only the lower triangle is given. */
 function solveInPlace(matrix: Float64Array, solution: Float64Array, size: number): void {
   for (let a = 0; a < size; a++) {
     for (let b = 0; b <= a; b++) {

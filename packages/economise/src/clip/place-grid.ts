@@ -1,18 +1,18 @@
-/** Splats that the distance between neighbours is estimated from. */
+/** The distance between neighbors is estimated from this number of splats. */
 const SAMPLES = 200;
 
-/** Points by the cell of a grid that they are in: those near a place are found without a look at the others. */
+/** A hash grid of points, for finding those near a position without visiting the others. */
 export class PlaceGrid {
-  /** Side of a cell, world units: what is farther away than that may not be found. */
+  /** Side of a cell in world units; points farther away may not be found. */
   readonly cell: number;
-  /** [N, 3] the cells of the points, in the order of `#points`. */
+  /** [N, 3] cells of the points, in the order of `#points`. */
   readonly #cells: Int32Array;
   readonly #mask: number;
-  /** Where the points of each bucket begin. */
+  /** Index of the first point in each bucket. */
   readonly #starts: Uint32Array;
   readonly #points: Uint32Array;
 
-  /** @param cells side of a cell, in typical distances between neighbours */
+  /** @param cells Side of a cell, in typical distances between neighbors. */
   static of(positions: Float32Array, count: number, cells: number): PlaceGrid {
     return new PlaceGrid(positions, count, cells * spacingOf(positions, count));
   }
@@ -40,7 +40,10 @@ export class PlaceGrid {
     }
   }
 
-  /** Calls with each point in the 27 cells around point `i` of other positions, those of its own cell first, until a call says that this is enough. */
+  /**
+   * Visits each point in the 27 cells around point `i` of other positions, those of its own cell first, until a call
+   * returns true.
+   */
   forEachNear(positions: Float32Array, i: number, isEnough: (point: number) => boolean): void {
     const x = Math.floor(positions[3 * i] / this.cell);
     const y = Math.floor(positions[3 * i + 1] / this.cell);
@@ -69,7 +72,10 @@ export class PlaceGrid {
   }
 }
 
-/** Median distance of a splat to its nearest neighbour, from a sample: of all others, along the axis that spreads farthest. */
+/**
+ * Median distance of a sampled splat to its nearest neighbor among all others, searched along the axis with the largest
+ * extent.
+ */
 function spacingOf(positions: Float32Array, count: number): number {
   if (count < 2) return 1;
   const order = Uint32Array.from({ length: count }, (_, i) => i);

@@ -6,14 +6,15 @@ import type { Tracks } from './tracks.js';
 /** Some of the splats of tracks. */
 export interface TrackedSplats {
   readonly cloud: GaussianCloud;
-  /** [tracks] the place of a track in the cloud, or -1 where it is none of them. */
+  /** [tracks] index of a track in the cloud, or -1 if it is not included. */
   readonly placeOf: Int32Array;
 }
 
 const LEAST = 1e-12;
 
 /**
- * [width · splats, frames] what each number of an attribute differs by from the cloud; before a splat's life and after it, as at its ends. Undefined where nothing differs.
+ * [width · splats, frames] difference of each number of an attribute from the cloud; constant before and after a
+ * splat's lifetime. Undefined if nothing differs.
  */
 export function changesOfTracks(tracks: Tracks, splats: TrackedSplats, name: MovingName): Float32Array | undefined {
   const { frames } = tracks;
@@ -46,7 +47,7 @@ export function changesOfTracks(tracks: Tracks, splats: TrackedSplats, name: Mov
   return changes;
 }
 
-/** Puts the numbers of splat `i` of a frame, less those of splat `place` of the cloud. */
+/** Writes the numbers of splat `i` of a frame minus those of splat `place` of the cloud. */
 type Read = (frame: GaussianCloud, i: number, place: number, out: Float64Array) => void;
 
 function numbersOf(name: Exclude<MovingName, 'rotation'>, cloud: GaussianCloud): Read {
@@ -70,7 +71,7 @@ function numbersOf(name: Exclude<MovingName, 'rotation'>, cloud: GaussianCloud):
   return reads[name];
 }
 
-/** Axes as long as the angles, each the nearest to that of the frame before. */
+/** Rotation vectors, each in the branch nearest to that of the previous frame. */
 function turnsOf({ cloud }: TrackedSplats): Read {
   const last = new Float64Array(4 * cloud.count);
   const turn = new Float64Array(4);
@@ -84,7 +85,7 @@ function turnsOf({ cloud }: TrackedSplats): Read {
     turnBetween(from, to, 0, turn);
     let cosine = 0;
     for (let k = 0; k < 4; k++) cosine += last[4 * place + k] * turn[k];
-    // Of a splat that was in no frame before, the smaller of both angles.
+    // For a splat without a previous frame, the smaller of both angles.
     const sign = (cosine || turn[0]) < 0 ? -1 : 1;
     for (let k = 0; k < 4; k++) last[4 * place + k] = turn[k] *= sign;
     const length = Math.hypot(turn[1], turn[2], turn[3]);

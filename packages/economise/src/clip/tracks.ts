@@ -3,18 +3,18 @@ import type { Lives } from '@gaussian-splat/formats';
 import { withNearAxes } from '../motion/near-axes.js';
 import { featuresOf, matchFrames, type Features } from './match-frames.js';
 
-/** Splats followed from frame to frame. */
+/** Splats that are tracked from frame to frame. */
 export interface Tracks {
   readonly count: number;
-  /** With axes of the same names in all frames of a splat. */
+  /** Frames with a consistent order of axes for each splat. */
   readonly frames: readonly GaussianCloud[];
-  /** [frames] of [splats of the frame]: the track that each belongs to. */
+  /** [frames] of [splats of the frame]: index of the track. */
   readonly of: readonly Int32Array[];
-  /** Of each track. */
+  /** Lifetime of each track. */
   readonly lives: Lives;
 }
 
-/** Follows splats through frames: those that nothing corresponds to in the frame before begin there, and those that nothing follows end. */
+/** Tracks splats through frames: unmatched splats start a track, and tracks without a match end. */
 export function followSplats(sources: readonly GaussianCloud[]): Tracks {
   const { origin } = sources[0];
   const frames: GaussianCloud[] = [sources[0]];
@@ -53,7 +53,7 @@ function velocitiesOf(before: Features, next: Features, matches: Int32Array): Fl
   return velocities;
 }
 
-/** Squared differences of logarithms and of quaternions from which on the axes of a splat may have other names than before. */
+/** Squared differences of logarithms and of quaternions above which the axes of a splat may have been reordered. */
 const SAME_AXES = 0.05;
 
 function withAxesOf(cloud: GaussianCloud, before: GaussianCloud, matches: Int32Array): GaussianCloud {
@@ -72,7 +72,7 @@ function withAxesOf(cloud: GaussianCloud, before: GaussianCloud, matches: Int32A
   return isSame ? cloud : withNearAxes(cloud, { ...cloud, rotations, scales });
 }
 
-/** The splats of all tracks, each as it is in the frame in which it is most opaque. */
+/** The splats of all tracks, each from the frame of its largest opacity. */
 export function cloudOfTracks({ count, frames, of }: Tracks): GaussianCloud {
   const [model] = frames;
   const shNumbers = 3 * shCoefficientCount(model.shDegree);

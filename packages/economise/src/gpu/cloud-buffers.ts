@@ -18,14 +18,14 @@ import {
 
 const { CULL_GROUP, SHAPE_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;
 
-/** Numbers that each attribute of a cloud has for a splat. */
+/** Numbers of each attribute of a cloud for a splat. */
 function widthsOf(degree: ShDegree) {
   return { positions: 3, scales: 3, rotations: 4, sh: 3 * shCoefficientCount(degree), opacities: 1 } as const;
 }
 
 /**
- * A cloud on the GPU, packed there by the stage that packs what generators write: a tenth of the time that the CPU takes for it. Splats stay in the cloud's order, so that a
- * slot is a splat's number; harmonics are float16. What the renderer cannot use is not drawn.
+ * A cloud on the GPU, packed by the stage for generator outputs in a tenth of the CPU time. Splats keep the order of
+ * the cloud, so that a slot is a splat's index; harmonics are float16. Unusable splats are not drawn.
  */
 export class CloudBuffers implements GaussianScene {
   readonly count: number;
@@ -60,7 +60,7 @@ export class CloudBuffers implements GaussianScene {
 
   /**
    * Uploads and packs a cloud.
-   * @param pageSplats most splats of a page; default what the device's limits allow
+   * @param pageSplats Maximum number of splats in a block; default: the limits of the device.
    * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`; `out-of-memory/*`
    */
   static async upload(device: GPUDevice, cloud: GaussianCloud, pageSplats = Infinity): Promise<CloudBuffers> {
@@ -80,7 +80,7 @@ export class CloudBuffers implements GaussianScene {
   }
 }
 
-/** An empty page, which the stage `ingest` may fill. */
+/** An empty block for the stage `ingest`. */
 export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): GaussianPage {
   const { storage, copySource } = BUFFER_USAGE;
   const buffer = (name: string, bytes: number): GPUBuffer =>
@@ -93,7 +93,7 @@ export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): Gaus
   };
 }
 
-/** Packs the splats of a page, from `first` on. What the cloud's arrays take is free again when that is done. */
+/** Packs the splats of a block, from `first` on. The memory of the uploaded arrays is freed afterwards. */
 function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: GaussianPage): void {
   const passing = new GpuMemory(device);
   try {
@@ -120,7 +120,7 @@ function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: Gaus
   }
 }
 
-/** `Ingest` of rows that all live. */
+/** `Ingest` parameters of rows that are all live. */
 function uniformOf(memory: GpuMemory, degree: ShDegree, count: number): GPUBuffer {
   const bytes = new ArrayBuffer(Ingest.size);
   const { positions, scales, rotations, sh, opacities } = widthsOf(degree);

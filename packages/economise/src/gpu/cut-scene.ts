@@ -9,7 +9,10 @@ import type { ScenePart, SceneParts } from './scene-parts.js';
 
 const DEGREES = 4;
 
-/** A copy of a scene that cuts are applied to, on the GPU: what goes becomes transparent, and colours take fewer bands. Chunks keep their bounds. */
+/**
+ * A copy of a scene on the GPU that cuts are applied to: removed splats become transparent, and colors lose bands.
+ * Chunks keep their bounds.
+ */
 export class CutScene implements GaussianScene {
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
@@ -17,7 +20,7 @@ export class CutScene implements GaussianScene {
   readonly #memory: GpuMemory;
   readonly #uniforms: readonly GPUBuffer[];
   readonly #kept: GPUBuffer;
-  /** Of each part: for each splat the degree that it keeps, or GONE. */
+  /** For each part: the degree that each splat keeps, or GONE. */
   readonly #choices: readonly GPUBuffer[];
   readonly #bindings: readonly GPUBindGroup[];
   #version = 0;
@@ -79,7 +82,7 @@ export class CutScene implements GaussianScene {
     return this.#version;
   }
 
-  /** Makes this scene what a cut leaves. Splats must have been scored. */
+  /** Applies a cut to the whole scene. Splats must have been scored. */
   apply({ minContribution = 0, removalPrice = 0, colourPrice = 0 }: Cut): void {
     const kernel = rareKernelOf(this.#device, economiseCut);
     const bytes = new ArrayBuffer(layouts.Cut.size);
@@ -102,13 +105,13 @@ export class CutScene implements GaussianScene {
     this.#version++;
   }
 
-  /** [4] splats that the last cut leaves, by the degree that they keep. */
+  /** [4] number of splats after the last cut, by the degree that they keep. */
   async degrees(): Promise<number[]> {
     const [counts] = await readBack(this.#device, [{ buffer: this.#kept, byteLength: 4 * DEGREES }]);
     return [...new Uint32Array(counts)];
   }
 
-  /** What the last cut leaves: splats by their numbers, and the degree of each of the scene's splats. */
+  /** Result of the last cut: indices of remaining splats, and the degree of each of the scene's splats. */
   async choice(): Promise<{ staying: Uint32Array; degrees: Uint8Array }> {
     const parts = this.#scene.parts.map(({ page }, p) => ({ buffer: this.#choices[p], byteLength: 4 * page.count }));
     const staying = new Uint32Array(this.count);

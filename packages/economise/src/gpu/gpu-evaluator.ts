@@ -21,28 +21,29 @@ import { exactViewpoint } from './show.js';
 import { seenIn } from './seen-splats.js';
 
 export interface GpuEvaluatorOptions {
-  /** Most splats that are bound at once, for tests; default what the device's limits allow. */
+  /** Maximum number of splats that are bound at once, for tests; default: the limits of the device. */
   readonly partSplats?: number;
-  /** Views whose energies are kept until they are added to the moments of colour, default 32. */
+  /** Number of views whose energies are stored until they are added to the moments of color, default 32. */
   readonly viewsAtOnce?: number;
-  /** Takes what stays out of the cloud, in parts; default {@link inline}. */
+  /** Extracts the remaining splats from the cloud in parallel; default {@link inline}. */
   readonly pool?: TaskPool;
-  /** Hears how many of the views have scored splats. */
+  /** Called with the number of scored views. */
   readonly onScored?: (views: number, all: number) => void;
 }
 
-/** Shaders whose pipelines are made once for a device. */
+/** Shaders whose pipelines are created once for a device. */
 const STAGES = [
   ...[shaders.economiseScore, shaders.economiseMoments, shaders.economiseLower, shaders.economiseCut],
   ...[shaders.economiseTake, shaders.pictureError, shaders.pictureErrorSum],
 ];
 
-/** Bytes of them are a fourth of what the moments take. */
+/** Their size is then a fourth of that of the moments. */
 const VIEWS_AT_ONCE = 32;
 
 /**
- * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and of its images only their errors come back. It takes 256 bytes of GPU memory a splat of
- * degree 3 for the scene and its copy, 872 for scores and colours, and 16 for each pixel of the views that errors are measured in.
+ * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and only the
+ * errors of its images are read back. For each splat of degree 3 it takes 256 bytes of GPU memory for the scene and its
+ * copy, and 872 for scores and colors, and 16 for each pixel of the views for measuring errors.
  */
 export class GpuEvaluator implements Evaluator {
   readonly #device: GPUDevice;
@@ -55,7 +56,7 @@ export class GpuEvaluator implements Evaluator {
   readonly #onScored: GpuEvaluatorOptions['onScored'];
   readonly #errors = new Map<JudgedViews, PictureErrors>();
   #ranking: Ranking | undefined;
-  /** All splats, the most seen first: a thread finds it meanwhile. Undefined where there is none. */
+  /** All splats, most visible first, computed by a thread meanwhile. Undefined without threads. */
   #order: Promise<Uint32Array> | undefined;
 
   private constructor(
@@ -77,7 +78,7 @@ export class GpuEvaluator implements Evaluator {
     this.#viewpoint = exactViewpoint(device);
   }
 
-  /** Makes pipelines that {@link create} and what follows would make, for those who wait for a cloud meanwhile. */
+  /** Compiles the pipelines of {@link create} and later steps, while the caller waits for a cloud. */
   static prepare(device: GPUDevice): void {
     for (const stage of STAGES) rareKernelOf(device, stage).prepare();
     exactViewpoint(device).destroy();
@@ -85,7 +86,8 @@ export class GpuEvaluator implements Evaluator {
 
   /**
    * Uploads a cloud.
-   * @param views of three kinds, none of which may share one: what was not seen in the first would seem unneeded in the second.
+   * @param views Three disjoint sets, because parts of the scene that the first misses would also seem unneeded in the
+   * second.
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async create(
@@ -116,7 +118,8 @@ export class GpuEvaluator implements Evaluator {
       }));
       this.#ranking = this.#rankingOf(await readBack(this.#device, parts));
       this.#order = this.#orderAhead(this.#ranking);
-      // Now, while the viewpoint still has room for this scene: for each other one it finds it anew.
+      // Measured now, while the viewpoint still has the capacity for this scene: for each other one it has to grow
+      // again.
       for (const views of ['searched', 'heldOut'] as const) await this.#errorsIn(views);
       return this.#ranking;
     } finally {
@@ -125,8 +128,8 @@ export class GpuEvaluator implements Evaluator {
   }
 
   /**
-   * [N] what the splats had of a scored view, one of the last that were drawn together: the sum of the squares of their weights over the pixels of its image, as far as
-   * peak and size tell.
+   * [N] energy of each splat in one of the last scoring views that were drawn together: the sum of its squared weights
+   * over the pixels of the image, estimated from peak and size.
    */
   async energiesIn(view: number): Promise<Float32Array> {
     const parts = this.#scene.parts.map(({ energies, row, page }) => ({
@@ -143,7 +146,7 @@ export class GpuEvaluator implements Evaluator {
     return found;
   }
 
-  /** How the scored views see the splats: what their attributes may be rounded by. */
+  /** Visibility of the splats in the scoring views, which determines their quantization. */
   async seen(): Promise<SeenSplats> {
     if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before seen()');
     return seenIn(this.#device, this.#scene, this.#views.scored.length);
@@ -220,7 +223,7 @@ export class GpuEvaluator implements Evaluator {
     const pool = poolFor(this.#pool, count, [scales]);
     if (pool === inline || isOfPlanes(positions)) return undefined;
     const order = pool.run('orderAll', [{ scales, contribution }]).then(([all]) => all);
-    // Whoever needs it hears of its error.
+    // The caller that awaits it receives the error.
     order.catch(() => undefined);
     return order;
   }
@@ -260,5 +263,5 @@ export class GpuEvaluator implements Evaluator {
   }
 }
 
-/** What the GPU found: WGSL has no infinity. */
+/** Converts the GPU's substitute for infinity, which WGSL lacks. */
 const judged = (error: number): number => (error >= shaders.UNJUDGED ? Infinity : error);

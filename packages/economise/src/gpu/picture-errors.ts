@@ -9,13 +9,13 @@ const { ERROR_TILE, pictureError, pictureErrorSum, PictureErrors: layout } = gen
 /** A sum of squares and a count of pixels. */
 const SUM_BYTES = 8;
 const COUNTS_BYTES = 16;
-/** Bindings begin at multiples of 256 bytes. */
+/** Bindings are aligned to 256 bytes. */
 const ALIGNED_TILES = 256 / SUM_BYTES;
 
-/** What is waited for between two pictures. */
+/** Awaited between two images. */
 export type Pause = () => Promise<void>;
 
-/** A view, and the picture that others are held against. */
+/** A view, and its reference image. */
 export interface Exhibit {
   readonly camera: Camera;
   readonly reference: GPUTexture;
@@ -25,14 +25,14 @@ export interface Exhibit {
 }
 
 /**
- * How far pictures of a scene are from those of another one in the same views. Pictures never leave the GPU: of each, a sum of squares and a number of pixels
- * come back, all in one read.
+ * Errors of images of a scene against those of a reference scene in the same views. Images never leave the GPU: for
+ * each a sum of squares and a number of pixels are read back, all in one read.
  */
 export class PictureErrors {
   readonly #device: GPUDevice;
   readonly #viewpoint: Viewpoint;
   readonly #memory: GpuMemory;
-  /** Pictures at hand, by their size. */
+  /** Target textures by size. */
   readonly #targets = new Map<string, GPUTexture>();
   readonly #exhibits: readonly Exhibit[];
   #covered: readonly number[] = [];
@@ -63,8 +63,8 @@ export class PictureErrors {
   }
 
   /**
-   * Draws the pictures that others will be held against.
-   * @param pause waited for between two pictures: the turn of others
+   * Draws the reference images.
+   * @param pause Awaited between two images, to yield to other tasks.
    */
   static async of(
     device: GPUDevice,
@@ -84,17 +84,17 @@ export class PictureErrors {
     }
   }
 
-  /** The views, and the pictures in them. */
+  /** The views, and their reference images. */
   get exhibits(): readonly Exhibit[] {
     return this.#exhibits;
   }
 
-  /** [views] pixels that the references cover. */
+  /** [views] number of pixels that the references cover. */
   get covered(): readonly number[] {
     return this.#covered;
   }
 
-  /** Mean squared error of the colours, peak 1, over the pixels that the reference covers, in each view where it covers any. */
+  /** Mean squared error of the colors, peak 1, over the pixels that the reference covers, for each view with any. */
   async measure(gaussians: GaussianScene, pause?: Pause): Promise<number[]> {
     const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.targetOf(camera), pause));
     return this.#covered.flatMap((pixels, k) => (pixels === 0 ? [] : [sums[2 * k] / (3 * pixels)]));
@@ -117,7 +117,7 @@ export class PictureErrors {
     };
   }
 
-  /** A picture to draw a view into. */
+  /** Returns the target texture for a view. */
   targetOf(camera: Camera): GPUTexture {
     const key = `${camera.width} x ${camera.height}`;
     const target = this.#targets.get(key) ?? this.#texture(camera, 'gs.economise.picture');
@@ -135,7 +135,7 @@ export class PictureErrors {
     });
   }
 
-  /** Draws all views, again where there was no room for all of them. @returns the sums to the references */
+  /** Draws all views, again if some did not fit. @returns The sums of their errors. */
   async #draw(
     gaussians: GaussianScene,
     targetOf: (exhibit: Exhibit) => GPUTexture,
@@ -152,7 +152,7 @@ export class PictureErrors {
       this.#addUp();
       const [found, counts] = await readBack(this.#device, [{ buffer: this.#errors }, { buffer: this.#counts }]);
       sums = found;
-      // Each call remembers the room that its view lacked.
+      // Each call also records the missing capacity of its view.
       const hadRoom = this.#exhibits.map((_, k) =>
         this.#viewpoint.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)),
       );

@@ -7,17 +7,17 @@ import type { ReducedCloud } from '../reduce.js';
 import { layouts } from './layouts.js';
 import type { ScenePart, SceneParts } from './scene-parts.js';
 
-/** Splats of a part that keep the same degree, which is below the scene's. */
+/** Splats of a part that keep the same degree, below that of the scene. */
 interface LoweredSplats {
   readonly part: ScenePart;
   readonly degree: ShDegree;
-  /** Their places in the reduced cloud. */
+  /** Their indices in the reduced cloud. */
   readonly places: Uint32Array;
 }
 
 /**
- * Puts the coefficients of the splats that keep a lower degree in their places. No more comes back from the GPU than these.
- * @param kept numbers in the scene of the reduced cloud's splats
+ * Writes the coefficients of the splats that keep a lower degree. Only these are read back from the GPU.
+ * @param kept Indices in the scene of the reduced cloud's splats.
  */
 export async function putLowered(
   device: GPUDevice,
@@ -46,7 +46,7 @@ export async function putLowered(
   }
 }
 
-/** The splats of a part, by degree; degrees that none of them keeps are left out. */
+/** Splats of a part by degree, without unused degrees. */
 function loweredSplatsOf(part: ScenePart, shDegree: ShDegree, kept: Uint32Array, degrees: Uint8Array): LoweredSplats[] {
   const end = part.first + part.page.count;
   const places = Array.from({ length: shDegree }, () => new Uint32Array(kept.length));
@@ -60,7 +60,7 @@ function loweredSplatsOf(part: ScenePart, shDegree: ShDegree, kept: Uint32Array,
     .filter((list) => list.places.length > 0);
 }
 
-/** Has the coefficients of some splats put one after another. */
+/** Copies the coefficients of some splats to a dense buffer. */
 function take(
   device: GPUDevice,
   memory: GpuMemory,
@@ -89,7 +89,7 @@ function take(
   return { buffer: taken, byteLength: 4 * count };
 }
 
-/** The same numbers in memory that tasks share. */
+/** Copies numbers to memory that tasks share. */
 function numbersIn(bytes: ArrayBuffer, pool: TaskPool): Float32Array {
   const numbers = new Float32Array(pool.allocate(bytes.byteLength));
   numbers.set(new Float32Array(bytes));

@@ -7,26 +7,27 @@ import { layouts } from './layouts.js';
 const CHUNK = 256;
 const FLOAT_BYTES = 4;
 
-/** A page of the scene, and what is known of its splats. */
+/** A block of the scene, and the results for its splats. */
 export interface ScenePart {
   readonly page: GaussianPage;
-  /** Number of its first splat among all, which is a multiple of 256. */
+  /** Index of its first splat among all, which is a multiple of 256. */
   readonly first: number;
-  /** Splats in whole chunks: from one row of `energies` to the next. */
+  /** Splats in whole chunks: the stride between rows of `energies`. */
   readonly row: number;
   /** array<Score> */
   readonly scores: GPUBuffer;
-  /** array<f32>: a row for each of the views at hand. */
+  /** array<f32>: a row for each view of the batch. */
   readonly energies: GPUBuffer;
-  /** array<f32>: a row for each number of the moments of colour: see shaders/shared/moments.wgsl. */
+  /** array<f32>: a row for each entry of the moments of color: see shaders/shared/moments.wgsl. */
   readonly moments: GPUBuffer;
   /** array<f32>: {@link loweredNumbers} for each splat. */
   readonly lowered: GPUBuffer;
 }
 
 /**
- * Numbers that come before the coefficients of a lower degree in what is found for each splat: an error for each lower degree, and the coefficients of degrees below that one.
- * With the scene's own degree: all of them. `lowered_numbers` of the shaders.
+ * Numbers before the coefficients of a lower degree in the data of each splat: an error for each lower degree, and the
+ * coefficients of the degrees below. For the scene's own degree it is their total. Same as `lowered_numbers` of the
+ * shaders.
  */
 export function loweredNumbers(degree: ShDegree, lower: number = degree): number {
   let numbers: number = degree;
@@ -34,19 +35,19 @@ export function loweredNumbers(degree: ShDegree, lower: number = degree): number
   return numbers;
 }
 
-/** Numbers of a triangle of basis functions against one another; none where there is no lower degree. */
+/** Entries in the lower triangle of a matrix of basis functions; none without a lower degree. */
 function momentNumbers(degree: ShDegree): number {
   const size = shCoefficientCount(degree);
   return degree === 0 ? 0 : (size * (size + 1)) / 2;
 }
 
-/** A cloud on the GPU, in parts that a binding holds with all that is found out about them. */
+/** A cloud on the GPU, in parts that fit a binding with all their results. */
 export class SceneParts {
   readonly gaussians: CloudBuffers;
   readonly parts: readonly ScenePart[];
-  /** Splats of the scene, of every part whole chunks. */
+  /** Splats of the scene, with every part rounded up to whole chunks. */
   readonly slots: number;
-  /** Views that `energies` has room for. */
+  /** Capacity of `energies` in views. */
   readonly views: number;
   readonly #memory: GpuMemory;
 
@@ -64,8 +65,8 @@ export class SceneParts {
   }
 
   /**
-   * @param views how many the scene is scored in at once
-   * @param mostSplats of a part; default what the device's limits allow
+   * @param views Number of views that are scored at once.
+   * @param mostSplats Maximum of a part; default: the limits of the device.
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async upload(

@@ -19,19 +19,23 @@ import type { SceneParts } from './scene-parts.js';
 import { show } from './show.js';
 
 /**
- * Squared difference of a splat's colour to what lies behind it, a channel: an assumption, on the low side of the means of captured scenes (0.05 to 0.16). It shifts
- * only what is tried first; what a cut costs is measured on pictures.
+ * Assumed squared difference of a splat's color from the colors behind it, for each channel: on the low side of the
+ * means of captured scenes (0.05 to 0.16). It affects only the first try, because the cost of a cut is measured in
+ * images.
  */
 const USUAL_CONTRAST = 0.02;
-/** Views that are drawn before any counts, spread over all: what a pair costs is learnt at the first, second, fourth and eighth frame. */
+/**
+ * Number of views, spread over all, that are drawn before the scoring: the cost of a pair is measured at the first,
+ * second, fourth and eighth frame.
+ */
 const REHEARSED = 8;
 const COUNTS_BYTES = 16;
 const FLOAT_BYTES = 4;
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 
 /**
- * Looks at a scene from all views and keeps on the GPU what they tell of each splat: the compute rasterizer notes the largest weight of each, and sums grow in buffers. Nothing
- * is read back but whether there was room, at the end.
+ * Scores a scene from all views and keeps the results on the GPU: the compute rasterizer records the largest weight of
+ * each splat, and sums accumulate in buffers. Only the overflow counts are read back, at the end.
  */
 export class SceneScorer {
   readonly #device: GPUDevice;
@@ -39,14 +43,14 @@ export class SceneScorer {
   readonly #scene: SceneParts;
   readonly #views: readonly Camera[];
   readonly #memory: GpuMemory;
-  /** By slot: the largest weights in the view at hand. */
+  /** The largest weights in the current view, by slot. */
   readonly #peaks: GPUBuffer;
   readonly #counts: GPUBuffer;
-  /** Where the views look from, page-local. */
+  /** Eyes of the views, in block-local coordinates. */
   readonly #eyes: GPUBuffer;
   readonly #targets = new Map<string, GPUTexture>();
 
-  /** @param viewpoint one with the rasterizer `tiles` */
+  /** @param viewpoint Must use the rasterizer `tiles`. */
   constructor(device: GPUDevice, viewpoint: Viewpoint, scene: SceneParts, views: readonly Camera[]) {
     this.#device = device;
     this.#viewpoint = viewpoint;
@@ -63,7 +67,7 @@ export class SceneScorer {
     this.#eyes = this.#memory.buffer('gs.economise.eyes', 16 * views.length, storage, eyesOf(views, scene));
   }
 
-  /** Scores all splats, and finds their colours at lower degrees. */
+  /** Scores all splats, and fits their colors at lower degrees. */
   async run(signal?: AbortSignal, onScored?: (views: number, all: number) => void): Promise<void> {
     await this.#rehearse(signal);
     await untilItHasRoom(() => this.#look(signal, onScored));
@@ -76,8 +80,8 @@ export class SceneScorer {
   }
 
   /**
-   * Draws a few views, waiting for each. The viewpoint finds the room that the others will need, and that their painting need not be divided into many submissions, which takes the CPU longer than it takes the
-   * GPU to draw.
+   * Draws a few views and waits for each. The viewpoint then has the capacity for the others, and knows that they need
+   * few submissions: more would take more CPU time than GPU time.
    */
   async #rehearse(signal: AbortSignal | undefined): Promise<void> {
     const step = Math.max(1, Math.floor(this.#views.length / REHEARSED));
@@ -94,7 +98,7 @@ export class SceneScorer {
     }
   }
 
-  /** Draws a view and notes the largest weights in it. */
+  /** Draws a view and records the largest weights in it. */
   #paint(camera: Camera): void {
     const target = this.#targetOf(camera);
     const auxiliary = new AuxiliaryOutputs({ contributions: this.#peaks });
@@ -102,7 +106,7 @@ export class SceneScorer {
     this.#viewpoint.draw(camera, { target, auxiliary });
   }
 
-  /** @returns whether there was room for all that each view should show; if not, there will be */
+  /** @returns Whether every view fitted the capacity; if not, the next try has enough. */
   async #look(signal: AbortSignal | undefined, onScored?: (views: number, all: number) => void): Promise<boolean> {
     const uniforms = this.#writeViews();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.clear' });
@@ -119,7 +123,7 @@ export class SceneScorer {
       const isLast = k === this.#views.length - 1;
       if (!isLast && (k + 1) % this.#scene.views !== 0) continue;
       this.#gather(k - (k % this.#scene.views), k + 1);
-      // The viewpoint's own looks at what a frame took come back meanwhile.
+      // Meanwhile the viewpoint reads its own counts back.
       await this.#device.queue.onSubmittedWorkDone();
       onScored?.(k + 1, this.#views.length);
     }
@@ -151,7 +155,7 @@ export class SceneScorer {
     return buffer;
   }
 
-  /** Adds what the view that was drawn last has told. */
+  /** Adds the results of the last view. */
   #note(uniforms: GPUBuffer, k: number): void {
     const kernel = rareKernelOf(this.#device, economiseScore);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.score' });
@@ -173,7 +177,7 @@ export class SceneScorer {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Adds the views from `first` to `end`, whose energies are at hand, to the moments of colour. */
+  /** Adds the energies of views `first` to `end` to the moments of color. */
   #gather(first: number, end: number): void {
     const { shDegree } = this.#scene.gaussians;
     if (shDegree === 0) return;
@@ -190,7 +194,7 @@ export class SceneScorer {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Turns sums into scores and colours, a submission for each part. */
+  /** Converts sums to scores and colors, one submission for each part. */
   #lower(): void {
     const kernel = rareKernelOf(this.#device, economiseLower);
     for (const { page, row, scores, moments, lowered } of this.#scene.parts) {
@@ -230,7 +234,7 @@ export class SceneScorer {
   }
 }
 
-/** [views, 4] where views look from, relative to the scene's origin; the fourth number fills up. */
+/** [views, 4] eyes relative to the scene's origin; the fourth number is padding. */
 function eyesOf(views: readonly Camera[], { gaussians }: SceneParts): Uint32Array {
   const places = views.flatMap(({ worldToCamera }) => [
     ...eyeOf(worldToCamera).map((value, axis) => value - gaussians.origin[axis]),

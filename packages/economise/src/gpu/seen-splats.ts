@@ -4,14 +4,18 @@ import type { SeenSplats } from '../pages/seen-splats.js';
 import { layouts } from './layouts.js';
 import type { SceneParts } from './scene-parts.js';
 
-/** Share of what is seen of a splat that is imagined besides, from everywhere: no coefficient is free altogether. */
+/**
+ * Fraction of a splat's energy that is added as uniform visibility from all directions, so that no coefficient is
+ * unconstrained.
+ */
 const IMAGINED = 0.1;
-/** Numbers of roots at most: a gigabyte. Of larger scenes the energies alone are told. */
+/** Maximum total of root entries: a gigabyte. For larger scenes only energies are returned. */
 const MOST_ROOTS = 2 ** 28;
 
 /**
- * How views saw the splats of a scene that has been scored in them. Part by part, since the moments of a large scene take gigabytes.
- * @param views that scored it
+ * Returns the visibility of a scored scene's splats in the scoring views, part by part, because the moments of a large
+ * scene take gigabytes.
+ * @param views Number of the views.
  */
 export async function seenIn(device: GPUDevice, scene: SceneParts, views: number): Promise<SeenSplats> {
   const { count, shDegree } = scene.gaussians;
@@ -37,7 +41,7 @@ export async function seenIn(device: GPUDevice, scene: SceneParts, views: number
   return { energies, roots };
 }
 
-/** Lower triangular roots (Cholesky) of the moments of each splat, by its energy. */
+/** Lower triangular roots (Cholesky) of the moments of each splat, divided by its energy. */
 function putRoots(
   roots: Float32Array,
   moments: Float32Array,

@@ -8,9 +8,10 @@ const { joinMoments, ROW, X, XX, XY, XZ, Y, YY, YZ, Z, ZZ } = splatRows;
 const NOWHERE = -1;
 
 /**
- * What is left of a reduced cloud when all merges up to a price are made. Where one of two has been dropped, the other stays as it is: nothing is saved twice. A merged splat keeps as many bands of colour as
- * that of both which keeps more, and comes where the first of them did. The source is left as it is.
- * @param price mean squared error of an image that a merge may cost by itself
+ * Applies all merges up to a price to a reduced cloud. If one splat of a pair has been dropped, the other stays
+ * unchanged, so that nothing is counted twice. A merged splat keeps the higher number of color bands of the two, and
+ * takes the earlier position in the order. The source is not modified.
+ * @param price Maximum mean squared error of an image from a single merge.
  */
 export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number): ReducedCloud {
   const { cloud, kept } = reduced;
@@ -19,12 +20,12 @@ export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number
   const [opacities, sh, degrees] = [cloud.opacities.slice(), cloud.sh.slice(), reduced.degrees.slice()];
   const numbers = 3 * shCoefficientCount(cloud.shDegree);
   const [isMerged, isGone, isClosed] = [0, 1, 2].map(() => new Uint8Array(cloud.count));
-  // Of each splat the first place of those that it was made of.
+  // Position of each merged splat: the first of its sources.
   const leads = Uint32Array.from(kept.keys());
   for (let k = 0; k < merges.prices.length; k++) {
     const [i, j] = [places[merges.into[k]], places[merges.from[k]]];
     if (i === NOWHERE || j === NOWHERE || isClosed[i] || isClosed[j] || merges.prices[k] > price) {
-      // What would have been made of these cannot be.
+      // Later merges that contain these splats become invalid.
       if (i !== NOWHERE) isClosed[i] = 1;
       if (j !== NOWHERE) isClosed[j] = 1;
       continue;
@@ -50,7 +51,7 @@ export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number
   };
 }
 
-/** [N] where the splats of the source are in the reduced cloud; N at least what merges name. */
+/** [N] index of each source splat in the reduced cloud, with N large enough for all merges. */
 function placesOf(kept: Uint32Array, { into, from }: Merges): Int32Array {
   const most = [kept, into, from].reduce((most, list) => list.reduce((a, b) => Math.max(a, b), most), 0);
   const places = new Int32Array(most + 1).fill(NOWHERE);
@@ -58,7 +59,7 @@ function placesOf(kept: Uint32Array, { into, from }: Merges): Int32Array {
   return places;
 }
 
-/** A cloud with the centres and shapes that some of its splats were given. @param isChosen [N] 1 for those */
+/** A cloud with new centers and shapes for some of its splats. @param isChosen [N] 1 for those. */
 function shapesFrom(rows: Float64Array, isChosen: Uint8Array, cloud: GaussianCloud): GaussianCloud {
   const [positions, scales, rotations] = [cloud.positions.slice(), cloud.scales.slice(), cloud.rotations.slice()];
   for (let i = 0, p = 0; i < cloud.count; i++, p += ROW) {

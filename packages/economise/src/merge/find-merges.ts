@@ -6,28 +6,34 @@ import { treeOf } from './neighbours.js';
 import { FAVOURITES } from './pair-candidates.js';
 import { PairCosts, pairState, type PairState } from './pair-costs.js';
 
-/** Views that pairs are looked at in: with half as many the wrong pairs are taken, with three times as many none better. */
+/**
+ * Number of views for evaluating pairs: with half as many wrong pairs are chosen, with three times as many the result
+ * does not improve.
+ */
 const VIEWS = 16;
-/** Rounds of pairs: each may make one of two that were made before. */
+/** Rounds of merging pairs, which may include splats merged before. */
 const MOST_ROUNDS = 6;
-/** A splat's pairs take as long as moving so many splats. */
+/** Equivalent cost of evaluating a splat's pairs, in splats to copy. */
 const MOVES = 32;
-/** Part of the pairs of a round that are merged at most, the cheapest: others may find better partners in the next. */
+/**
+ * Maximum fraction of the pairs of a round that are merged, cheapest first: others may find better partners in the
+ * next.
+ */
 const PART = 0.5;
 
-/** What may be merged, in the order in which it would be: `from[k]` becomes part of `into[k]`. */
+/** Possible merges in order of application: `from[k]` is merged into `into[k]`. */
 export interface Merges {
   readonly into: Uint32Array;
   readonly from: Uint32Array;
-  /** What the splat at `into` counts for in the means of both, 0..1. */
+  /** Weight of the splat at `into` in the means of both, 0..1. */
   readonly shares: Float32Array;
-  /** Opacity of both as one. */
+  /** Opacity of the merged splat. */
   readonly opacities: Float32Array;
-  /** Mean squared error of an image that a merge costs by itself, and at least that of those that it stands on. */
+  /** Mean squared error of an image from a single merge, and at least that of the merges that it depends on. */
   readonly prices: Float32Array;
 }
 
-/** Pairs of one round, the cheapest first. */
+/** Pairs of one round, cheapest first. */
 interface Pairs {
   readonly first: Uint32Array;
   readonly second: Uint32Array;
@@ -35,11 +41,12 @@ interface Pairs {
 }
 
 /**
- * Finds pairs of neighbours that look like one splat, by Ward's way (1963): the cheapest pairs become one, and these and the others are paired anew, until the estimated error is more than any that
- * matters. Estimates are too low by a factor of ten or so, but in the right order.
- * @param views to look at pairs in; sixteen of them, evenly, are
- * @param mostError mean squared error of the images that matters at most
- * @param pool looks at pairs, whatever its size with the same result
+ * Finds pairs of neighbors that resemble a single splat, by Ward's method (1963): the cheapest pairs are merged, and
+ * all splats are paired again, until the estimated error exceeds the limit. Estimates are too low by a factor of about
+ * ten, but in the right order.
+ * @param views Sixteen of them, evenly spaced, are used to evaluate pairs.
+ * @param mostError Limit of the mean squared error of images.
+ * @param pool Evaluates pairs; its size does not affect the result.
  */
 export async function findMerges(
   cloud: GaussianCloud,
@@ -53,7 +60,7 @@ export async function findMerges(
   const costs = new PairCosts(state);
   const merges = { into: [], from: [], shares: [], opacities: [], prices: [] } as Record<keyof Merges, number[]>;
   const prices = new Float32Array(cloud.count);
-  // Splats that too few views looked at stay as they are.
+  // Splats that too few views contain are not merged.
   let slots = Uint32Array.from(removalError.keys()).filter((i) => Number.isFinite(removalError[i]));
   let spent = 0;
   for (let round = 0; round < MOST_ROUNDS && spent < mostError; round++) {
@@ -85,13 +92,13 @@ export async function findMerges(
   };
 }
 
-/** So many of the views, or all. */
+/** Evenly spaced views, at most this many. */
 function evenly(views: readonly Camera[], most: number): Camera[] {
   const step = views.length / Math.min(most, views.length);
   return Array.from({ length: Math.min(most, views.length) }, (_, k) => views[Math.floor(k * step)]);
 }
 
-/** Pairs of which no two share a splat: the cheapest of all, the cheapest of the rest, and so on. */
+/** Selects disjoint pairs greedily, cheapest first. */
 function pairsOf(candidates: Pairs, count: number): Pairs {
   const isTaken = new Uint8Array(count);
   const pairs: [number, number, number][] = [];
@@ -108,7 +115,7 @@ function pairsOf(candidates: Pairs, count: number): Pairs {
   };
 }
 
-/** Each splat with those of its neighbours that it looks most alike with. */
+/** Pairs of each splat with its most similar neighbors. */
 async function candidatesOf(state: PairState, slots: Uint32Array, pool: TaskPool): Promise<Pairs> {
   const allocate = (bytes: number): ArrayBufferLike => pool.allocate(bytes);
   const count = state.visible.length;

@@ -8,20 +8,20 @@ import { applyMerges } from './apply-merges.js';
 import { findMerges, type Merges } from './find-merges.js';
 
 export interface MergingOptions {
-  /** Views that pairs are judged in: those that splats are scored in. */
+  /** Views for evaluating pairs: the scoring views. */
   readonly views: readonly Camera[];
-  /** Merges are found up to this estimated cost: the mean squared error of the images that the wanted figure allows. */
+  /** Limit of the estimated cost of merges: the mean squared error of images at the target PSNR. */
   readonly mostError: number;
-  /** Finds them in parts; default {@link inline}. */
+  /** Finds merges in parallel; default {@link inline}. */
   readonly pool?: TaskPool;
 }
 
-/** Parts of the splats that merges would save, at whose prices it is measured what they cost. */
+/** Fractions of the mergeable splats at whose prices the cost of merging is measured. */
 const MERGED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
 /**
- * An evaluator whose cuts merge splats, too, besides what another one does. Merges are found and made in plain code, found in threads where there are; what they cost is measured on images by the other, which draws the cloud that they
- * leave.
+ * An evaluator that adds merging to the cuts of another one. Merges are found and applied in TypeScript, in threads if
+ * available; their cost is measured on images by the other evaluator, which draws the merged cloud.
  */
 export class MergingEvaluator implements Evaluator {
   readonly #inner: Evaluator;
@@ -30,8 +30,8 @@ export class MergingEvaluator implements Evaluator {
   #merges: Merges | undefined;
 
   /**
-   * @param inner is destroyed with this one
-   * @param cloud the one that `inner` looks at
+   * @param inner Is destroyed with this one.
+   * @param cloud The cloud that `inner` evaluates.
    */
   constructor(inner: Evaluator, cloud: GaussianCloud, options: MergingOptions) {
     this.#inner = inner;
@@ -39,7 +39,7 @@ export class MergingEvaluator implements Evaluator {
     this.#options = options;
   }
 
-  /** Prices to measure merges at, the lowest first. */
+  /** Measured prices of merges, in ascending order. */
   get mergePrices(): readonly number[] {
     const prices = this.#found.prices.slice().sort();
     const places = MERGED_SHARES.map((share) => Math.floor(share * this.#cloud.count) - 1);

@@ -1,24 +1,24 @@
-/** Points of a leaf, which are compared one by one. */
+/** Points in a leaf, which are compared one by one. */
 const LEAF = 12;
 
-/** Numbers of a box: least x, y, z and greatest. */
+/** Numbers of a box: minimum x, y, z and maximum. */
 const BOX = 6;
 
 /** A k-d tree of points, in arrays that threads can share. */
 export interface PointTree {
   /** [N, 3] */
   readonly positions: Float32Array;
-  /** Numbers of the points that count, those of a leaf next to one another. */
+  /** Indices of the points, with those of a leaf adjacent. */
   readonly order: Uint32Array;
-  /** Bounds of the parts of `order`: of all, and of part n in 2n + 1 and 2n + 2 those of its halves. */
+  /** Bounds of the nodes: of the root, and of the children of node n in 2n + 1 and 2n + 2. */
   readonly boxes: Float32Array;
 }
 
 /**
- * Puts points into a tree.
+ * Builds a tree of points.
  * @param positions [N, 3]
- * @param points numbers of those that count
- * @param allocate gives memory for the tree's own arrays
+ * @param points Indices of the points to include.
+ * @param allocate Allocates the tree's own arrays.
  */
 export function treeOf(
   positions: Float32Array,
@@ -35,10 +35,10 @@ export function treeOf(
 }
 
 /**
- * The nearest neighbours of points among those of a tree.
- * @param points numbers of points
- * @param most neighbours of a point
- * @returns [points, most] numbers of the neighbours, the nearest first; -1 where there are fewer
+ * Finds the nearest neighbors of points in a tree.
+ * @param points Indices of points.
+ * @param most Number of neighbors of each point.
+ * @returns [points, most] indices of the neighbors, nearest first; -1 if there are fewer.
  */
 export function nearestNeighbours(tree: PointTree, points: Uint32Array, most: number): Int32Array {
   const found = new Int32Array(most * points.length).fill(-1);
@@ -50,7 +50,7 @@ export function nearestNeighbours(tree: PointTree, points: Uint32Array, most: nu
   return found;
 }
 
-/** Puts points in the order of a k-d tree: those of each box are halved along its longest side. */
+/** Sorts points into the order of a k-d tree: each box is split at the median of its longest side. */
 function putBox(tree: PointTree, node: number, first: number, end: number): void {
   const { positions, order, boxes } = tree;
   const at = BOX * node;
@@ -72,7 +72,7 @@ function putBox(tree: PointTree, node: number, first: number, end: number): void
   putBox(tree, 2 * node + 2, middle, end);
 }
 
-/** Hoare's selection (1961): what is less than the middle one comes before it, what is larger after it. */
+/** Hoare's selection (1961): smaller elements end up before the median, larger ones after it. */
 function halve(positions: Float32Array, order: Uint32Array, first: number, end: number, axis: number): void {
   const middle = (first + end) >> 1;
   let [low, high] = [first, end - 1];
@@ -94,9 +94,9 @@ function halve(positions: Float32Array, order: Uint32Array, first: number, end: 
 }
 
 /**
- * Looks for what is nearer than what was found.
- * @param node of the tree, whose points are those from `first` to `end` of its order
- * @param distances squared, ascending, of what is in `found`
+ * Searches a subtree for nearer points.
+ * @param node Index of the node, whose points are those from `first` to `end` of the order.
+ * @param distances Squared distances of the points in `found`, ascending.
  */
 function search(
   tree: PointTree,

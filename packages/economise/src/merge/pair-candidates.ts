@@ -1,23 +1,23 @@
 import { nearestNeighbours, type PointTree } from './neighbours.js';
 import { PairCosts, type PairState } from './pair-costs.js';
 
-/** Neighbours that a splat may be merged with, and how many of them are looked at in all views rather than in every fourth. */
+/** Candidate neighbors for merging, and the number of them that are evaluated in all views instead of in every fourth. */
 const NEIGHBOURS = 10;
 export const FAVOURITES = 4;
 const GLANCE = 4;
 
-/** Partners of some splats, to be found. */
+/** A task to find the partners of some splats. */
 export interface Partnering {
   readonly state: PairState;
   readonly tree: PointTree;
-  /** Numbers of the splats. */
+  /** Indices of the splats. */
   readonly slots: Uint32Array;
-  /** [slots, FAVOURITES] where the partners go, and what becoming one would cost: Infinity where there is none. */
+  /** [slots, FAVOURITES] resulting partners, and the costs of merging: Infinity for none. */
   readonly partners: Uint32Array;
   readonly costs: Float32Array;
 }
 
-/** Finds for each splat those of its neighbours that it looks most alike with. */
+/** Finds the most similar neighbors of each splat. */
 export function findPartners({ state, tree, slots, partners, costs: found }: Partnering): void {
   const costs = new PairCosts(state);
   const neighbours = nearestNeighbours(tree, slots, NEIGHBOURS);

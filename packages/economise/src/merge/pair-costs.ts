@@ -5,7 +5,7 @@ import { AMPLITUDE, SEEN, seenSplats, U, UU, UV, V, VV } from './seen-splats.js'
 
 const root = new Float64Array(6);
 
-/** Puts centre and covariance of a splat into its row, laid out as the renderer lays out splats that it merges. @param rows [N, ROW] */
+/** Writes center and covariance of a splat to its row, in the renderer's layout for merging. @param rows [N, ROW] */
 export function writeRow(cloud: GaussianCloud, i: number, rows: Float64Array): void {
   const p = splatRows.ROW * i;
   scaleRotationFactor(cloud, i, root);
@@ -16,35 +16,35 @@ export function writeRow(cloud: GaussianCloud, i: number, rows: Float64Array): v
 }
 
 const { joinMoments, MASS, ROW, X, Y, Z } = splatRows;
-/** Squared difference of a splat's colour to what lies behind it, a channel: the mean of captured scenes. */
+/** Squared difference of a splat's color from the colors behind it, for each channel: the mean of captured scenes. */
 const CONTRAST = 0.05;
-/** A pair that fewer views show is left alone. */
+/** Minimum number of views that must show a pair. */
 const LEAST_VIEWS = 4;
-/** ∫ Y² over the sphere is 1: a coefficient's square over this is the mean square of what it adds. */
+/** ∫ Y² over the sphere is 1, so a squared coefficient divided by this is the mean square of its contribution. */
 const SPHERE = 4 * Math.PI;
 
-/** What is known of the splats that may be merged: plain arrays, which threads can share. */
+/** State of the mergeable splats: plain arrays, which threads can share. */
 export interface PairState {
   /** [N] see splat-rows.ts of the renderer. */
   readonly rows: Float64Array;
-  /** [N, views] what views see of them: seen-splats.ts. */
+  /** [N, views] projections: seen-splats.ts. */
   readonly seen: Float32Array;
-  /** [N] the part of a splat's opacity that shows where it shows most: what lies before it hides the rest. */
+  /** [N] visible fraction of a splat's opacity at its most visible place. */
   readonly visible: Float32Array;
   /** [N, numbers] */
   readonly sh: Float32Array;
   readonly numbers: number;
   readonly views: number;
-  /** Of a view, the mean of all. */
+  /** Mean number of pixels of the views. */
   readonly pixels: number;
   readonly antialiased: boolean;
   readonly filterVariance: number;
 }
 
 /**
- * @param contribution [N] largest weight in a pixel, see {@link Ranking}
- * @param views some from all around: a pair that looks like one splat from here may not from there
- * @param allocate gives memory for what is known, 0.4 kB a splat and its harmonics
+ * @param contribution [N] largest weight in a pixel, see {@link Ranking}.
+ * @param views Views from all around, because a pair may resemble one splat from one side only.
+ * @param allocate Allocates the state, 0.4 kB for each splat plus its harmonics.
  */
 export function pairState(
   cloud: GaussianCloud,
@@ -74,11 +74,12 @@ export function pairState(
 }
 
 /**
- * Splats that may be merged, and what that would cost. A merged splat has the first two moments of both, each weighed by what the views see of it, its colour is the mean with the same weights, and
- * its opacity is what covers as much in the views as both did. A slot holds a splat of the cloud, or what it was merged into.
+ * Costs of merging splats. A merged splat has the first two moments of both, weighted by their visibility, the mean
+ * color with the same weights, and the opacity that covers the same area in the views. A slot holds a splat of the
+ * cloud, or the splat that it was merged into.
  */
 export class PairCosts {
-  /** Of the pair that was looked at last: the share of the first, and the opacity of both as one. */
+  /** For the last evaluated pair: the weight of the first splat, and the merged opacity. */
   share = 1;
   opacity = 0;
   readonly #state: PairState;
@@ -97,7 +98,7 @@ export class PairCosts {
     ({ sh: this.#sh, numbers: this.#numbers, antialiased: this.#antialiased, filterVariance: this.#variance } = state);
   }
 
-  /** Puts where the splats are into `found`, [N, 3]. */
+  /** Writes the positions of the splats to `found`, [N, 3]. */
   positions(found: Float32Array): Float32Array {
     const count = this.#rows.length / ROW;
     for (let i = 0; i < count; i++) for (const axis of [X, Y, Z]) found[3 * i + axis] = this.#rows[ROW * i + axis];
@@ -105,10 +106,11 @@ export class PairCosts {
   }
 
   /**
-   * Mean squared error of a view's image, peak 1, if two splats become one; Infinity where they cannot.
-   * The two, of weights w in a view, and the one in their place differ by w₁G₁ + w₂G₂ − wG before whatever lies behind, and by the differences of their colours to the mean; the squares of Gaussians have
-   * integrals in closed form, ∫ G₁ G₂ = 2π √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
-   * @param step looks at every so many-th view only
+   * Mean squared error of a view's image, peak 1, from merging two splats; Infinity if they cannot be merged. With
+   * weights w in a view, the two differ from the merged one by w₁G₁ + w₂G₂ − wG against the background, and by the
+   * differences of their colors from the mean; the squares of Gaussians have closed-form integrals, ∫ G₁ G₂ = 2π √|Σ₁|
+   * √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
+   * @param step Evaluates only every n-th view.
    */
   cost(i: number, j: number, step = 1): number {
     const rows = this.#rows;
@@ -118,7 +120,8 @@ export class PairCosts {
     if (!(p >= 0)) return Infinity;
     const [seeI, seeJ] = [this.#visible[i], this.#visible[j]];
     const visible = p * seeI + q * seeJ;
-    // Sums over views, all areas in units of 2π: of the cover and its product with that of one, of squares and products of what is seen.
+    // Sums over views, all areas in units of 2π: of the coverage and its product with that of the merged splat, and of
+    // squares and products of the weights.
     let [covered, ownSquare, squares, products, own, apart, views] = [0, 0, 0, 0, 0, 0, 0];
     const stride = SEEN * step;
     let b = SEEN * this.#views * j;
@@ -162,7 +165,7 @@ export class PairCosts {
     return (2 * Math.PI * square) / (views * this.#state.pixels);
   }
 
-  /** Makes slot `i` the pair that was looked at last, which was `i` and `j`. */
+  /** Merges the last evaluated pair, `i` and `j`, into slot `i`. */
   join(i: number, j: number): void {
     const { share: p, opacity } = this;
     const rows = this.#rows;
@@ -191,7 +194,7 @@ export class PairCosts {
     }
   }
 
-  /** Mean square over all directions of how far the colours of two splats are apart, a channel. */
+  /** Mean squared difference of the colors of two splats over all directions, for each channel. */
   #colourDifference(i: number, j: number): number {
     let sum = 0;
     for (let k = 0, a = this.#numbers * i, b = this.#numbers * j; k < this.#numbers; k++) {
@@ -202,7 +205,7 @@ export class PairCosts {
   }
 }
 
-/** What a splat weighs in means: the cover that shows, over all views. */
+/** Writes the weight of a splat in means: its visible coverage, over all views. */
 function weigh({ rows, seen, visible, views }: PairState, i: number, contribution: number): void {
   let [most, cover] = [0, 0];
   for (let view = 0; view < views; view++) {
@@ -216,13 +219,13 @@ function weigh({ rows, seen, visible, views }: PairState, i: number, contributio
   rows[ROW * i + MASS] = visible[i] * cover;
 }
 
-/** ∫ G₁ G₂ over 2π √|Σ₁| √|Σ₂|, from the sum of the covariances and the distance of the centres. */
+/** ∫ G₁ G₂ over 2π √|Σ₁| √|Σ₂|, from the sum of the covariances and the distance of the centers. */
 function overlap(uu: number, uv: number, vv: number, du: number, dv: number): number {
   const determinant = uu * vv - uv * uv;
   return Math.exp((-0.5 * (vv * du * du - 2 * uv * du * dv + uu * dv * dv)) / determinant) / Math.sqrt(determinant);
 }
 
-/** Share of its opacity that a splat keeps when the dilation, which the covariance has in it, makes it larger. */
+/** Factor of a splat's opacity that compensates the dilation contained in the covariance. */
 function compensation(uu: number, uv: number, vv: number, variance: number): number {
   const determinant = uu * vv - uv * uv;
   return Math.sqrt(Math.max(0, (uu - variance) * (vv - variance) - uv * uv) / determinant);

@@ -2,22 +2,22 @@ import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 
 /** Screen-space dilation of 3D Gaussian Splatting, px². */
 export const DILATION = 0.3;
-/** Less than this no renderer paints. */
+/** Minimum alpha that renderers draw. */
 export const ALPHA_MIN = 1 / 255;
 const JACOBIAN_MARGIN = 0.3;
 
-/** Splats on the screen, one array for each quantity. */
+/** Projected splats, one array for each quantity. */
 export interface Projected {
   readonly count: number;
   readonly source: Uint32Array;
   readonly depths: Float32Array;
-  /** [count, 6]: centre x and y, conic xx, xy, yy, opacity. */
+  /** [count, 6]: center x and y, conic xx, xy, yy, opacity. */
   readonly ellipses: Float32Array;
-  /** [count]: half the height of the box in which alpha reaches 1/255. */
+  /** [count]: half the height of the box with alpha of at least 1/255. */
   readonly halfHeights: Float32Array;
 }
 
-/** R·S of every splat, [N, 9], rows outermost. */
+/** R·S of every splat, [N, 9], row-major. */
 export function factors({ count, rotations, scales }: GaussianCloud): Float32Array {
   const out = new Float32Array(9 * count);
   for (let i = 0; i < count; i++) {
@@ -37,7 +37,7 @@ export function factors({ count, rotations, scales }: GaussianCloud): Float32Arr
   return out;
 }
 
-/** The splats of a cloud that a camera may see; `roots` are its {@link factors}. */
+/** Projects the splats of a cloud that may be visible to a camera; `roots` are its {@link factors}. */
 export function project(cloud: GaussianCloud, roots: Float32Array, camera: Camera): Projected {
   const { count, positions, opacities, origin, antialiased, filterVariance = DILATION } = cloud;
   const { fx, fy, cx, cy, width, height, near, far, worldToCamera: m } = camera;

@@ -1,16 +1,19 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { factors, project } from './project.js';
 
-/** Numbers of a splat in a view. */
+/** Numbers of a splat in each view. */
 export const SEEN = 6;
-/** Centre, px. */
+/** Center, px. */
 export const [U, V] = [0, 1] as const;
-/** Covariance on the screen, the dilation in it, px². */
+/** Screen covariance including dilation, px². */
 export const [UU, UV, VV] = [2, 3, 4] as const;
-/** Opacity on the screen; 0 for a splat that is not in the view. */
+/** Projected opacity; 0 for a splat outside the view. */
 export const AMPLITUDE = 5;
 
-/** What views see of splats, put into zeros. @param seen [N, views, SEEN], rows of a splat next to one another @returns `seen` */
+/**
+ * Projects splats into views; writes to a zeroed array. @param seen [N, views, SEEN], rows of a splat contiguous
+ * @returns `seen`
+ */
 export function seenSplats(cloud: GaussianCloud, views: readonly Camera[], seen: Float32Array): Float32Array {
   const roots = factors(cloud);
   views.forEach((camera, view) => {

@@ -2,21 +2,21 @@ import type { Trades } from '../fit.js';
 import type { Cut } from '../reduce.js';
 import type { TradeCurve } from '../search.js';
 
-/** What a cut costs, mean squared error, and how many numbers of the file it saves. */
+/** Mean squared error of a cut, and the numbers of the file that it saves. */
 export interface MeasuredCut {
   readonly error: number;
   readonly saved: number;
 }
 
-/** Shares of the error that are tried for merges. */
+/** Fractions of the error that are tried for merges. */
 const MERGE_SHARES = [0, 0.25, 0.5, 0.75, 0.9, 1];
-/** Cuts that are tried for each of them, until one comes near the error that is allowed. */
+/** Cuts that are tried for each of them, until the error is near the limit. */
 const TRIES = 3;
 const NEAR_ENOUGH = 0.97;
 
 /**
- * How much of the error should go to merges, and how much to the rest. Splats that are dropped and splats that are merged are often the same ones, so that what both save together is measured, in the searched
- * views, and not added up.
+ * Divides the error between merges and other cuts. Dropped and merged splats are often the same ones, so their combined
+ * saving is measured, in the search views, instead of added.
  */
 export async function tradeMerges(
   others: Trades,

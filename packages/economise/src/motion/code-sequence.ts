@@ -25,37 +25,38 @@ export interface CodeSequenceOptions {
   /** Reads a frame: all have the same splats in the same order. */
   readonly openFrame: (frame: number) => Promise<GaussianCloud>;
   readonly framesPerFile: number;
-  /** PSNR of frames to their sources over covered pixels, dB. */
+  /** PSNR of frames against their sources over covered pixels, dB. */
   readonly minDecibels: number;
   readonly device: GPUDevice;
   readonly encodeWebp: EncodeWebp;
   readonly deflate: Deflate;
-  /** Compresses what is measured and thrown away; default: `deflate`. */
+  /** Compresses temporary data for measurements; default: `deflate`. */
   readonly deflateQuickly?: Deflate;
   /** Called with a sentence about each step. */
   readonly onStep?: (step: string) => void;
 }
 
 export interface CodedSequence {
-  /** The first frame, SOG. */
+  /** The first frame as SOG. */
   readonly first: Uint8Array<ArrayBuffer>;
-  /** Files of motion: `framesPerFile` frames each. */
+  /** Files of motion with `framesPerFile` frames each. */
   readonly files: readonly Uint8Array<ArrayBuffer>[];
-  /** PSNR of all measured frames together, and of the worst view of them. */
+  /** PSNR of all measured frames together, and of their worst view. */
   readonly decibels: number;
   readonly worstDecibels: number;
 }
 
-/** Share of the error that the first frame makes; motion adds the rest. */
+/** Fraction of the error that the first frame may use; motion uses the rest. */
 const FIRST_SHARE = 0.5;
 const MAX_TRIES = 4;
 const NEAR_ENOUGH = 0.85;
-/** Frames that are measured at the end. */
+/** Number of frames that are measured at the end. */
 const JUDGED = 3;
 
 /**
- * Codes a sequence whose splats correspond: the first frame as a scene, and what moves in it. Rounding is as coarse as images of some frames allow.
- * @throws GaussianSplatError `argument/value` for frames of another number of splats
+ * Encodes a sequence with corresponding splats: the first frame as a scene, and its motion. Quantization is as coarse
+ * as images of some frames allow.
+ * @throws GaussianSplatError `argument/value` for frames with another number of splats
  */
 export async function codeSequence(options: CodeSequenceOptions): Promise<CodedSequence> {
   const { frameCount, framesPerFile, minDecibels, device, deflate, onStep = () => undefined } = options;
@@ -100,7 +101,7 @@ export function judgeOf(device: GPUDevice, cloud: GaussianCloud, count: number, 
   return GpuEvaluator.create(device, cloud, { scored: views.slice(0, 1), searched: views, heldOut: views });
 }
 
-/** The first frame as SOG, its splats as they are read from it, and other frames in the order that its file has. */
+/** The first frame as SOG, its splats after reading it back, and other frames in the order of its file. */
 async function codeFirst({ openFrame, device, encodeWebp }: CodeSequenceOptions, target: number) {
   const source = await openFrame(0);
   const judge = await judgeOf(device, source, 3, 1);
@@ -119,7 +120,10 @@ async function codeFirst({ openFrame, device, encodeWebp }: CodeSequenceOptions,
   return { bytes, first: await read(bytes), openOrdered };
 }
 
-/** Steps at which a frame of a file of motion reaches the target, and a byte saves the same error in all attributes. */
+/**
+ * Finds the steps that reach the target in a frame of a file of motion, and at which a byte saves the same error in all
+ * attributes.
+ */
 async function findMotionSteps(
   first: GaussianCloud,
   frames: readonly GaussianCloud[],
@@ -160,14 +164,14 @@ const ARRAYS = {
   color: 'sh',
 } as const;
 
-/** Numbers of a splat of each attribute that changes. */
+/** Numbers of a splat for each animated attribute. */
 function numbersOf(frames: readonly GaussianCloud[]): Partial<Steps<MovingName>> {
   const [one, other] = [frames[0], frames[frames.length >> 1]];
   const changes = (name: MovingName): boolean => one[ARRAYS[name]].some((value, i) => value !== other[ARRAYS[name]][i]);
   return Object.fromEntries(MOVING_NAMES.filter(changes).map((name) => [name, MOVING[name]]));
 }
 
-/** A frame of a file of motion that was just written. */
+/** Reads back a frame of a file of motion. */
 async function frameOf(first: GaussianCloud, bytes: Uint8Array, frames: number, frame: number): Promise<GaussianCloud> {
   const budget = (): LoadBudget => new LoadBudget(2 ** 40);
   const motion = await readMotion({ bytes, name: 'motion', splats: first.count, frames, budget: budget() });

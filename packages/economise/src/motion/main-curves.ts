@@ -1,11 +1,11 @@
-/** Rows that curves are found from, at most: more say hardly anything else. */
+/** Curves are computed from at most this number of rows, because more hardly change the result. */
 const MOST_ROWS = 30_000;
 const MOST_SWEEPS = 30;
 
 /**
- * The curves that rows follow most, each of root mean square 1 and across all others (their principal components, about 0), the most followed first.
+ * Principal components (about 0) of the rows as curves, each with a root mean square of 1, strongest first.
  * @param rows [N, length]
- * @param least root mean square of what rows follow of a curve, as a rule, below which it is left out
+ * @param least Root mean square weight below which a curve is dropped.
  */
 export function mainCurves(rows: Float32Array, length: number, least: number): Float64Array[] {
   const count = rows.length / length;
@@ -30,7 +30,7 @@ export function mainCurves(rows: Float32Array, length: number, least: number): F
     .map(({ curve }) => curve.map((part) => part * Math.sqrt(length)));
 }
 
-/** Eigenvalues and eigenvectors of a symmetric matrix, by Jacobi's rotations. The matrix is used up. */
+/** Eigenvalues and eigenvectors of a symmetric matrix, by Jacobi's rotations. The matrix is destroyed. */
 function eigen(matrix: Float64Array, size: number): { values: number[]; vectors: Float64Array[] } {
   const vectors = Array.from({ length: size }, (_, k) =>
     Float64Array.from({ length: size }, (_, i) => (i === k ? 1 : 0)),

@@ -1,11 +1,14 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
 const HALF = Math.SQRT1_2;
-/** Of scales, so that they have logarithms. */
+/** Lower limit of scales, so that they have logarithms. */
 const LEAST = 1e-12;
-/** None, and half a turn about each axis: they change signs alone. */
+/** The identity, and half turns about each axis: they only change signs. */
 const HALF_TURNS = [0, 1, 2, 3].map((axis) => [0, 1, 2, 3].map((k) => (k === axis ? 1 : 0)));
-/** Quaternions that turn axes onto axes, and which axis becomes the first, the second and the third: all names that the axes of an ellipsoid can have. The first changes nothing. */
+/**
+ * Quaternions that permute the axes, and the resulting first, second and third axis: all axis orders of an ellipsoid.
+ * The first is the identity.
+ */
 const RENAMINGS: readonly { readonly turn: readonly number[]; readonly axes: readonly number[] }[] = [
   { turn: [1, 0, 0, 0], axes: [0, 1, 2] },
   { turn: [HALF, HALF, 0, 0], axes: [0, 2, 1] },
@@ -24,12 +27,15 @@ function product([w, x, y, z]: readonly number[], [a, b, c, d]: readonly number[
   ];
 }
 
-/** Squared radians, and squared octaves of e, that a frame is so near to the one before by that no other names are nearer. */
+/**
+ * Squared difference to the previous frame, in radians and in logarithms, below which the order of axes is certainly
+ * unchanged.
+ */
 const NEAR = 0.1;
 
 /**
- * The same splats with the names of their axes that make rotations and scales nearest to those of another frame: tools that take covariances apart name axes by their lengths,
- * which change places as splats deform.
+ * Reorders the axes of splats so that rotations and scales are nearest to those of another frame, because tools that
+ * decompose covariances sort axes by length, and the order changes as splats deform.
  */
 export function withNearAxes(cloud: GaussianCloud, near: GaussianCloud): GaussianCloud {
   const [rotations, scales] = [cloud.rotations.slice(), cloud.scales.slice()];

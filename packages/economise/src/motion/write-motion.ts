@@ -13,7 +13,10 @@ import type { Deflate } from '../pages/page-planes.js';
 import type { Steps } from '../steps.js';
 import { mainCurves } from './main-curves.js';
 
-/** What is rounded: `position` in world units, `rotation` in radians, `scale` in natural logarithms, `opacity` and `color` (the constant coefficient) in their own. */
+/**
+ * Quantization steps: `position` in world units, `rotation` in radians, `scale` in natural logarithms, `opacity` and
+ * `color` (the constant coefficient) in their own units.
+ */
 export type MotionSteps = Steps<MovingName>;
 
 export interface MotionOptions {
@@ -21,34 +24,35 @@ export interface MotionOptions {
   readonly deflate: Deflate;
 }
 
-/** Codes below this share of a step are 0: zeros cost hardly a bit. */
+/** Codes below this fraction of a step become 0, because zeros cost almost no bits. */
 const DEAD_ZONE = 0.6;
-/** Curves that splats follow by less than this share of a step, as a rule, are left out. */
+/** Curves with typical weights below this fraction of a step are dropped. */
 const LEAST_CURVE = 0.12;
 const MOST_CODE = 32_767;
 /** An empty last block of a deflate stream. */
 const END = Uint8Array.of(3, 0);
 
-/** What one attribute does, as it is written. */
+/** Motion of one attribute as written. */
 export type WrittenPart = MovingPart;
 
-/** The curves that the numbers of an attribute follow most, the most followed first. */
+/** The principal curves of an attribute's numbers, strongest first. */
 export interface Followed {
-  /** [width · splats] numbers that change. */
+  /** [width · splats] animated numbers. */
   readonly rows: number;
   readonly frames: number;
   /** [frames] each. */
   readonly curves: readonly Float64Array[];
-  /** [rows] of each curve: how much of it a number follows. */
+  /** [rows] for each curve: its weight for each number. */
   readonly shares: readonly Float32Array[];
 }
 
 /**
- * Writes a file of motion: what frames differ by from the first frame of their sequence, whose splats correspond to theirs, one by one.
- * Of each attribute the curves are found that its numbers follow most, over the frames of the file; of each splat it is written how much it follows each.
- * @param first as it is read from its file
- * @param frames whose axes have the names that those of the first have: see `withNearAxes`
- * @throws GaussianSplatError `argument/value` for frames of other splats
+ * Writes a file of motion: the differences of frames from the first frame of their sequence, with corresponding splats.
+ * The principal curves of each attribute are computed over the frames of the file; the weights of each splat are
+ * stored.
+ * @param first As read back from its file.
+ * @param frames With the axis order of the first frame: see `alignAxes`.
+ * @throws GaussianSplatError `argument/value` for frames with other splats.
  */
 export function writeMotion(
   first: GaussianCloud,
@@ -65,7 +69,7 @@ export function writeMotion(
   return motionFile({ splats: first.count, frames: frames.length, parts, deflate });
 }
 
-/** A file of motion of what {@link MOVING_NAMES} do, in their order. */
+/** Writes a file of motion with {@link ANIMATED_ATTRIBUTE_NAMES}, in their order. */
 export function motionFile({
   splats,
   frames,
@@ -95,13 +99,13 @@ export function motionFile({
   return concatenated([deflate(begin), ...lifetimes, ...planes.map(({ bytes }) => bytes), END]);
 }
 
-/** The low bytes of some words, and the high ones. */
+/** The low bytes of words, and the high ones. */
 const halvesOf = (words: Uint16Array): readonly Uint8Array[] => [
   Uint8Array.from(words, (word) => word & 255),
   Uint8Array.from(words, (word) => word >> 8),
 ];
 
-/** [width · splats, frames] what each number differs by from the first frame; undefined where all are as they were. */
+/** [width · splats, frames] difference of each number from the first frame; undefined if all are unchanged. */
 function changesOf(first: GaussianCloud, frames: readonly GaussianCloud[], name: MovingName): Float32Array | undefined {
   const { count } = first;
   const changes = new Float32Array(MOVING[name] * count * frames.length);
@@ -138,7 +142,7 @@ function numbersOf(
   }[name];
 }
 
-/** Axes as long as the angles, each the nearest to that of the frame before. */
+/** Rotation vectors, each in the branch nearest to that of the previous frame. */
 function putTurns(
   first: GaussianCloud,
   frames: readonly GaussianCloud[],
@@ -161,7 +165,7 @@ function putTurns(
   }
 }
 
-/** The quaternion that leads from one rotation to another. */
+/** The quaternion that rotates one orientation to another. */
 export function turnBetween(from: Float32Array, to: Float32Array, at: number, turn: Float64Array): void {
   const [w, x, y, z] = [from[at], -from[at + 1], -from[at + 2], -from[at + 3]];
   const [a, b, c, d] = [to[at], to[at + 1], to[at + 2], to[at + 3]];
@@ -173,19 +177,19 @@ export function turnBetween(from: Float32Array, to: Float32Array, at: number, tu
 
 export const UNCHANGED: WrittenPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
 
-/** Curves that splats follow by less than this, as a rule, are not worth a code at a step. */
+/** Minimum typical weight of a curve at a step. */
 export const leastCurve = (step: number): number => LEAST_CURVE * step;
 
 /**
  * @param changes [rows, frames]
- * @param least see {@link leastCurve}
+ * @param least See {@link leastCurve}.
  */
 export function followed(changes: Float32Array, frames: number, least: number): Followed {
   const curves = mainCurves(changes, frames, least);
   return { rows: changes.length / frames, frames, curves, shares: curves.map((curve) => sharesOf(changes, curve)) };
 }
 
-/** [rows] how much each row follows a curve. */
+/** [rows] weight of a curve for each row. */
 export function sharesOf(changes: Float32Array, curve: Float64Array): Float32Array {
   const frames = curve.length;
   const shares = new Float32Array(changes.length / frames);
@@ -197,7 +201,7 @@ export function sharesOf(changes: Float32Array, curve: Float64Array): Float32Arr
   return shares;
 }
 
-/** The same with codes of a step, or of a larger one where codes would not fit; curves that nothing follows by then are left out. */
+/** Quantizes with a step, or with a larger one if codes would overflow; drops curves that become unused. */
 export function roundedPart(
   { rows, frames, curves: found, shares }: Followed,
   asked: number,
@@ -219,7 +223,7 @@ export function roundedPart(
   return { rank, step, curves, codes: Array.from({ length: width }, (_, number) => ofNumber(number)).flat() };
 }
 
-/** Codes as two planes of bytes, whichever way is smaller. */
+/** Codes as two planes of bytes, in the smaller of both codings. */
 function smaller(codes: Int16Array, deflate: MotionOptions['deflate']): { mode: number; bytes: Uint8Array } {
   const differences = codes.map((code, i) => code - (i > 0 ? codes[i - 1] : 0));
   const [plain, changed] = [codes, differences].map((own) => {

@@ -33,20 +33,20 @@ import { shellOrder } from './shell-order.js';
 
 const { CULL_GROUP } = constants;
 
-/** A page before it has a name. */
+/** A page without a name. */
 export interface BuiltPage {
   readonly chunks: number;
-  /** How many of them, the first, have their parent in another page or none. */
+  /** Number of its first chunks that have their parent in another page or none. */
   readonly upper: number;
-  /** Page of the tree that holds the chunk above, and the number of that chunk in it. */
+  /** Page of the tree that holds the parent, and the index of the parent chunk in it. */
   readonly parent?: readonly [page: number, chunk: number];
-  /** Level and number of each chunk. */
+  /** Level and index of each chunk. */
   readonly holds: readonly (readonly [level: number, chunk: number])[];
 }
 
-/** Levels of a scene or of a part of it, ready to be cut into pages. */
+/** Levels of a scene or of a part of it, ready to be divided into pages. */
 export interface DetailTree {
-  /** Of the finest level, those that fill up chunks not counted. */
+  /** Number of splats of the finest level, without padding. */
   readonly splats: number;
   readonly levels: readonly SplatLevel[];
   /** `Chunk` rows of each level. */
@@ -55,7 +55,7 @@ export interface DetailTree {
   readonly shPrecision: ShPrecision;
   readonly geometry?: 'quantized';
   readonly antialiased: boolean;
-  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   /** See `CloudHints.order`. */
   readonly order?: 'pixel' | undefined;
@@ -64,12 +64,15 @@ export interface DetailTree {
 }
 
 export interface DetailTreeOptions {
-  /** Half of the bytes for centres, shapes and opacities. Default: as precise as scenes that are not streamed. */
+  /**
+   * `quantized`: half the bytes for centers, shapes and opacities. Default: same precision as scenes that are not
+   * streamed.
+   */
   readonly geometry?: 'quantized';
 }
 
 /**
- * The levels of detail of a cloud. A scene with another up than (0, -1, 0) is turned.
+ * Builds the levels of detail of a cloud. A scene with an up direction other than (0, -1, 0) is rotated.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOptions = {}): DetailTree {
@@ -93,7 +96,7 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
 }
 
-/** The finest level; where coordinates are relative to chunks, in chunks whose splats are not too far apart. */
+/** The finest level; for chunk-relative coordinates its chunks have a limited extent. */
 function leavesOf(cloud: GaussianCloud, kept: Uint32Array, geometry: DetailTree['geometry']): SplatLevel {
   if (geometry === undefined) return leafLevel(cloud, kept);
   const { order, fillers } = shellOrder(cloud.positions, kept);
@@ -102,7 +105,7 @@ function leavesOf(cloud: GaussianCloud, kept: Uint32Array, geometry: DetailTree[
   return leaves;
 }
 
-/** Bounds and errors of levels whose finest may itself stand for something, to `leaves`' errors. */
+/** Computes bounds and errors of levels; `leaves` are the errors of the finest. */
 export function treeOf(
   levels: readonly SplatLevel[],
   geometry: DetailTree['geometry'],
@@ -116,9 +119,9 @@ export function treeOf(
 }
 
 /**
- * How a tree is cut into pages, parents before children: the first holds the coarsest chunk and those it stands for, each other the chunks
- * below one chunk, and those below these.
- * @param withTop false to leave the coarsest chunk to another tree: then the first page holds what is below it
+ * Divides a tree into pages, parents before children: the first holds the coarsest chunk and its children, each other
+ * one the children of a chunk, and their children.
+ * @param withTop False to leave the coarsest chunk to another tree: the first page then starts with its children.
  */
 export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true): BuiltPage[] {
   const pages: BuiltPage[] = [];
@@ -143,13 +146,14 @@ export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true)
     });
   };
   const top = levels.length - 1;
-  // Where the levels are odd in number the first page has one alone: pages of the finest, of which there are most, are full.
+  // If the number of levels is odd, the first page has only one, so that pages of the finest, the most numerous, are
+  // full.
   if (withTop) add(top, [0], undefined, top % 2 === 0);
   else if (top > 0) add(top - 1, below(top - 1, [0]), undefined, top % 2 === 1);
   return pages;
 }
 
-/** The words of a page's file: see docs/lod-format.md. */
+/** Packs the words of a page's file: see docs/lod-format.md. */
 export function packPage(tree: DetailTree, { holds, chunks }: BuiltPage): Uint32Array<ArrayBuffer> {
   const { levels, shPrecision, geometry: kind } = tree;
   const layout = pageLayout({ shDegree: levels[0].shDegree, shPrecision, geometry: kind }, chunks);
@@ -187,7 +191,7 @@ function rowOf({ errors }: DetailTree, level: number, chunk: number): Float32Arr
   return detailRows(one(errors[level], chunk), above && one(above, chunk >> 2));
 }
 
-/** What `detail.json` says of a scene of one tree. */
+/** Returns the manifest of a scene with one tree. */
 export function manifestOf(
   tree: DetailTree,
   pages: readonly BuiltPage[],
@@ -219,7 +223,7 @@ export function manifestOf(
   };
 }
 
-/** A coding without what only its writer needs. */
+/** Removes the fields of a coding that only its writer needs. */
 const statedOf = ({ size, directions, opacity, color, chroma, scale }: PageCoding): PageCoding => ({
   ...{ size, directions, opacity, color, chroma, scale },
 });

@@ -31,43 +31,46 @@ const { CULL_GROUP, ALPHA_MIN, QUANTIZED_OPAQUE, QUANTIZED_T_ZERO, QUANTIZED_UV_
 const MOST_PLACES = 65_535;
 const MOST_SIZES = 255;
 const MOST_COLOR = 32_000;
-/** The share of a chunk's splats that are smaller than the one whose size coordinates are rounded by. */
+/** Rank of the splat size, as a fraction of a chunk's splats, that determines the coordinate step. */
 const SIZE_RANK = 0.35;
-/** How much larger steps are above the finest level, in octaves: such levels are far off, and leave out much more than they round. */
+/**
+ * Additional octaves of the steps above the finest level, because such levels are far away, and their merging error is
+ * much larger than their rounding error.
+ */
 const COARSE: Octaves = { place: 4, size: 2, direction: 2, opacity: 2, color: 1, harmonics: 2 };
 const FINEST: Octaves = { place: 0, size: 0, direction: 0, opacity: 0, color: 0, harmonics: 0 };
 
 type Octaves = Readonly<Record<'place' | 'size' | 'direction' | 'opacity' | 'color' | 'harmonics', number>>;
 
-/** Steps of what is rounded, in no unit that they share. */
+/** Quantization steps, in different units. */
 export interface PageSteps {
-  /** Of coordinates, in the least size of a splat of their chunk that many are smaller than. */
+  /** Step of coordinates, relative to the splat size at a low rank of the chunk. */
   readonly place: number;
   /** Octaves. */
   readonly size: number;
-  /** Parts of the maps that directions are in. */
+  /** Step of the direction maps. */
   readonly direction: number;
   readonly opacity: number;
-  /** Of the constant coefficient, and of its differences of colours. */
+  /** Steps of the constant coefficient, and of its color differences. */
   readonly color: number;
   readonly chroma: number;
-  /** Of the other coefficients, in splats that show much. */
+  /** Step of the other coefficients, for the most visible splats. */
   readonly harmonics: number;
 }
 
-/** Of a scene that nothing is known of: some 45 to 50 dB. */
+/** Default steps for an unknown scene: about 45 to 50 dB. */
 export const USUAL_STEPS: PageSteps = {
   ...{ place: 0.15, size: 1 / 16, direction: 1 / 48, opacity: 1 / 90, color: 1 / 28, chroma: 1 / 14 },
   harmonics: 1 / 40,
 };
 
-/** What a writer has to know besides. */
+/** Additional parameters of a writer. */
 export interface WrittenCoding extends PageCoding {
-  /** Between two coordinates, as a part of how large splats of the chunk are. */
+  /** Step of coordinates, relative to the size of the chunk's splats. */
   readonly place: number;
 }
 
-/** The steps that files can have, and those next to the given ones. */
+/** Returns the nearest steps that files can represent. */
 export function codingOf(steps: PageSteps): WrittenCoding {
   const odd = 2 * Math.round((1 / steps.direction - 1) / 2) + 1;
   const scale = Math.round(SCALE_STEPS * (Math.log2(127 * steps.harmonics) + SCALE_BIAS));
@@ -82,11 +85,14 @@ export function codingOf(steps: PageSteps): WrittenCoding {
   };
 }
 
-/** What {@link PageEncoder} takes besides a tree and its coding. */
+/** Options of {@link PageEncoder} besides a tree and its coding. */
 export interface PageEncoderOptions {
-  /** Compresses a piece of a file. */
+  /** Compresses a block of a file. */
   readonly deflate: Deflate;
-  /** How the splats of the tree's cloud are seen: what shows little is rounded more. Default: as opacities and sizes tell. */
+  /**
+   * Visibility of the splats of the tree's cloud: less visible ones are quantized more coarsely. Default: estimated
+   * from opacities and sizes.
+   */
   readonly seen?: SeenSplats | undefined;
 }
 
@@ -99,19 +105,19 @@ export class PageEncoder {
   readonly #rounder: HarmonicRounder;
   readonly #weights: SplatWeights;
 
-  /** @param coding of all files of the folder */
+  /** @param coding Coding of all files of the folder. */
   constructor(tree: DetailTree, coding: WrittenCoding, { deflate, seen }: PageEncoderOptions) {
     const [leaves] = tree.levels;
     this.#tree = tree;
     this.#coding = coding;
     this.#deflate = deflate;
-    // Splats of planes stay in the file's order: see mortonOrder.
+    // Splats of planes keep the order of the file: see mortonOrder.
     this.#keepsOrder = isOfPlanes(leaves.positions);
     this.#rounder = new HarmonicRounder(shNumbers(leaves.shDegree) / 3, seen);
     this.#weights = new SplatWeights(leaves, seen?.energies);
   }
 
-  /** The file of a page. */
+  /** Encodes the file of a page. */
   encode({ holds, chunks }: BuiltPage): Uint8Array<ArrayBuffer> {
     const { levels, errors } = this.#tree;
     const { shDegree } = levels[0];
@@ -142,7 +148,7 @@ export class PageEncoder {
     return level === this.#tree.levels[0] ? FINEST : COARSE;
   }
 
-  /** Puts splats into planes. @returns how far they reach, as boundLevel finds it */
+  /** Writes splats to planes. @returns Their reach, as in boundLevel. */
   #putSplats(level: SplatLevel, { splats }: Ordered, least: number, planes: Planes): number {
     const octaves = this.#octavesOf(level);
     let [fine, coarse, reach] = [0, 0, 0];
@@ -174,7 +180,7 @@ export class PageEncoder {
     });
   }
 
-  /** @returns what the constant coefficient makes up for */
+  /** @returns Correction of the constant coefficient. */
   #putHarmonics(level: SplatLevel, i: number, octaves: Octaves, planes: Planes): readonly number[] {
     const rounder = this.#rounder;
     const number = numberOf(level, i);
@@ -182,7 +188,7 @@ export class PageEncoder {
     const seenAs = level === this.#tree.levels[0] ? number : undefined;
     let own = Math.round(1 + this.#weights.below(level, i) + octaves.harmonics);
     own = Math.min(CLASSES, Math.max(1, own));
-    // One that does not fit into bytes needs larger steps.
+    // A splat whose codes overflow a byte needs larger steps.
     while (!rounder.round(level.sh, first, seenAs, stepOf(this.#coding, own)) && own < CLASSES) own++;
     const isNone = rounder.codes.every((code) => code === 0);
     planes.put(PLANES.class, isNone ? 0 : own);
@@ -190,7 +196,7 @@ export class PageEncoder {
     return rounder.constantShift();
   }
 
-  /** Splats of a chunk along a curve through it, on which coordinates differ little from one to the next. */
+  /** Sorts the splats of a chunk along a curve, so that consecutive coordinates differ little. */
   #ordered(level: SplatLevel, first: number, count: number): Ordered {
     const own = level.positions.subarray(3 * first, 3 * (first + count));
     const origin = [0, 1, 2].map((axis) => extremeOf(own, axis, Math.min));
@@ -209,7 +215,7 @@ export class PageEncoder {
 interface Ordered {
   readonly origin: readonly number[];
   readonly step: number;
-  /** Number in the level, and the upper and the lower bytes of the coordinates, {@link interleaved}. */
+  /** Index in the level, and the upper and the lower bytes of the coordinates, {@link interleaved}. */
   readonly splats: readonly { readonly i: number; readonly coarse: number; readonly fine: number }[];
 }
 
@@ -235,7 +241,7 @@ function largestOf({ factors }: SplatLevel, first: number, count: number): numbe
   return largest;
 }
 
-/** Of the least extents of splats, the one that {@link SIZE_RANK} of them are below. */
+/** The smallest extents of splats at the rank {@link SIZE_RANK}. */
 function typicalSize({ factors }: SplatLevel, first: number, count: number): number {
   const lengths = new Float64Array(3);
   const sizes = Float64Array.from({ length: count }, (_, k) => {
@@ -245,7 +251,7 @@ function typicalSize({ factors }: SplatLevel, first: number, count: number): num
   return sizes[Math.floor(SIZE_RANK * (sizes.length - 1))];
 }
 
-/** @returns how far the splat reaches */
+/** @returns Reach of the splat. */
 function putShape(
   { factors, opacities }: SplatLevel,
   i: number,
@@ -261,13 +267,13 @@ function putShape(
     planes.put(PLANES.size + k, code);
     trace += 2 ** (2 * (least + coding.size * code));
   });
-  // As packQuantizedChunk turns columns.
+  // Same sign convention as packQuantizedChunk.
   const [first, second] = [factors[f] < 0 ? -1 : 1, factors[f + 2] < 0 ? -1 : 1];
   const t = directionIn2(first * factors[f + 1], factors[f + 2]);
   const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
   const last = coding.directions - 1;
   const zeros = [QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO, QUANTIZED_UV_ZERO];
-  // From the middle, which is no turn at all.
+  // Relative to the center of the range, which is no rotation.
   [t, u, v].forEach((number, k) => {
     const code = last / 2 + roundedTo((number / zeros[k] - 1) * (last / 2), octaves.direction);
     planes.put(PLANES.direction + k, Math.min(last, Math.max(0, code)));
@@ -281,5 +287,5 @@ function putShape(
 const stepOf = ({ scale }: PageCoding, own: number): number =>
   2 ** ((scale + CLASS_STEP * (own - 1)) / SCALE_STEPS - SCALE_BIAS) / 127;
 
-/** The nearest multiple of 2^octaves steps. */
+/** Rounds to a multiple of 2^octaves steps. */
 const roundedTo = (steps: number, octaves: number): number => 2 ** octaves * Math.round(steps / 2 ** octaves);

@@ -16,11 +16,11 @@ export interface PageStepsOptions {
   /** The cloud that the tree was built from. */
   readonly cloud: GaussianCloud;
   readonly device: GPUDevice;
-  /** PSNR over covered pixels of held-out views that the finest pages reach, dB. */
+  /** PSNR over covered pixels of held-out views for the finest pages, dB. */
   readonly minDecibels: number;
-  /** Views that find how splats are seen, which harmonics are rounded by. */
+  /** Number of views for the visibility of splats, which controls the quantization of harmonics. */
   readonly scored: number;
-  /** Compresses pages that are measured and thrown away: a fast setting suffices. */
+  /** Compresses temporary pages for measurements: a fast setting suffices. */
   readonly deflate: Deflate;
   /** Called with a sentence about each measurement. */
   readonly onStep?: (step: string) => void;
@@ -28,15 +28,16 @@ export interface PageStepsOptions {
 
 export interface FoundPageSteps {
   readonly steps: PageSteps;
-  /** How views see the splats of the cloud; undefined for a cloud without harmonics. */
+  /** Visibility of the splats of the cloud; undefined for a cloud without harmonics. */
   readonly seen: SeenSplats | undefined;
-  /** PSNR of all held-out views together, and of the worst of them. */
+  /** PSNR of all held-out views together, and of the worst one. */
   readonly decibels: number;
   readonly worstDecibels: number;
 }
 
 /**
- * Finds the coarsest steps with which the finest pages of a scene reach a PSNR in held-out views. An attribute whose rounding shows little gets larger steps.
+ * Finds the coarsest steps with a given PSNR of the finest pages in held-out views. Attributes whose rounding is less
+ * visible get larger steps.
  * @throws GaussianSplatError `out-of-memory/*`
  */
 export async function findPageSteps(options: PageStepsOptions): Promise<FoundPageSteps> {
@@ -70,13 +71,13 @@ export async function findPageSteps(options: PageStepsOptions): Promise<FoundPag
   }
 }
 
-/** Numbers of a splat that each step rounds. About half of the harmonics are 0 and cost little. */
+/** Numbers of a splat for each step. About half of the harmonics are 0 and cost little. */
 const numbersOf = (degree: ShDegree): Partial<Steps<keyof PageSteps>> => ({
   ...{ place: 3, size: 3, direction: 3, opacity: 1, color: 1, chroma: 2 },
   ...(degree > 0 && { harmonics: 1.5 * ((degree + 1) ** 2 - 1) }),
 });
 
-/** The finest level as coded pages hold it. */
+/** Decodes the finest level of coded pages. */
 async function cloudOfPages(
   { tree, pages, deflate }: Pick<PageStepsOptions, 'tree' | 'pages' | 'deflate'>,
   steps: PageSteps,

@@ -4,21 +4,21 @@ import { cutPages, manifestOf, packPage, type BuiltPage, type DetailTree } from 
 import { PageEncoder, type PageEncoderOptions, type WrittenCoding } from './encode-page.js';
 import { treeOfCopies } from './tile-tree.js';
 
-/** How the files of a folder are coded. */
+/** Coding of the files of a folder. */
 export interface FolderCoding extends PageEncoderOptions {
   readonly coding: WrittenCoding;
 }
 
 export interface PageFolderOptions {
-  /** Default: files are words as the GPU reads them, not compressed. */
+  /** Default: files contain the uncompressed words of the GPU. */
   readonly coded?: FolderCoding | undefined;
-  /** Translations of copies of the scene, neighbors next to one another; default: the scene alone. */
+  /** Translations of copies of the scene, neighbors adjacent; default: a single scene. */
   readonly places?: readonly Vector3[] | undefined;
   /** Stores a file under its path in the folder. */
   readonly put: (path: string, bytes: Uint8Array<ArrayBuffer>) => void;
 }
 
-/** Writes the pages of a scene, or of copies of it. @returns the manifest that names them, for `detail.json` */
+/** Writes the pages of a scene, or of copies of it. @returns The manifest, for `lod.json`. */
 export function writePages(tree: DetailTree, { coded, places, put }: PageFolderOptions): DetailManifest {
   const write = (name: string, from: DetailTree, pages: readonly BuiltPage[], how = coded): DetailManifest => {
     const encoder = how && new PageEncoder(from, how.coding, how);
@@ -31,7 +31,7 @@ export function writePages(tree: DetailTree, { coded, places, put }: PageFolderO
   if (places === undefined) return write('scene', tree, cutPages(tree));
   const above = treeOfCopies(tree, places);
   const abovePages = cutPages(above);
-  // How views see the splats is known of the scene alone.
+  // Visibility is known only for the scene itself.
   const top = write('top', above, abovePages, coded && { ...coded, seen: undefined });
   const part = write('part', tree, cutPages(tree, false));
   const parents = new Map<number, readonly [page: number, chunk: number]>();

@@ -1,10 +1,10 @@
 import { concatenated } from '../concatenated.js';
 import { DIFFERENCES, headBytes, PLAIN, PLANES, planesOf, type SplatLevel } from '@gaussian-splat/renderer/tools';
 
-/** What compresses bytes to a piece of a raw deflate stream that others are put behind: it ends with a sync flush. */
+/** Compresses bytes to a section of a raw deflate stream: it ends with a sync flush, so that others can be appended. */
 export type Deflate = (bytes: Uint8Array) => Uint8Array;
 
-/** What the planes of a file are made of: values in the order of its splats, chunk by chunk. */
+/** Content of a file's planes: values in the order of its splats, chunk by chunk. */
 export class Planes {
   readonly bytes: Uint8Array[];
   count = 0;
@@ -19,18 +19,18 @@ export class Planes {
     this.bytes[plane][this.count] = value & 255;
   }
 
-  /** Coefficients above the constant one, of a class above 0. */
+  /** Appends coefficients above the constant one, for a class above 0. */
   putHarmonics(codes: Int8Array): void {
     codes.forEach((code, k) => (this.bytes[PLANES.harmonics + k][this.#classed] = code & 255));
     this.#classed++;
   }
 
-  /** Says that what comes now is of a finer level. */
+  /** Marks the start of the finer level. */
   beginLower(): void {
     this.#lower = [this.count, this.#classed];
   }
 
-  /** Planes, and where in each those of the finer level begin. Splats that have harmonics are fewer. */
+  /** Planes, and the offset of the finer level in each. Only some splats have harmonics. */
   get whole(): { plane: Uint8Array; lower: number }[] {
     const [all, classed] = this.#lower;
     return this.bytes.map((plane, k) =>
@@ -39,7 +39,7 @@ export class Planes {
   }
 }
 
-/** The bytes before the planes; how these are told is not known yet. */
+/** The bytes in front of the planes, before the coding of planes is known. */
 export function headOf(
   counts: readonly number[],
   floats: Float32Array,
@@ -57,7 +57,7 @@ export function headOf(
 /** An empty last block of a deflate stream. */
 const END = Uint8Array.of(3, 0);
 
-/** The file of some planes: pieces of a deflate stream, one behind the other. */
+/** Builds a file from planes: concatenated sections of a deflate stream. */
 export function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Deflate): Uint8Array<ArrayBuffer> {
   const runs = new Runs(deflate);
   planes.forEach(({ plane, lower }, k) => {
@@ -70,7 +70,7 @@ export function joined(head: Uint8Array, { whole: planes }: Planes, deflate: Def
   return concatenated([deflate(head), ...runs.pieces, END]);
 }
 
-/** Bytes, and what they are compressed to. */
+/** Bytes, and their compressed form. */
 interface Piece {
   readonly bytes: Uint8Array;
   readonly deflated: Uint8Array;
@@ -80,7 +80,7 @@ const pieceOf = (bytes: Uint8Array, deflate: Deflate): Piece => ({ bytes, deflat
 
 const lengthOf = (pieces: readonly Piece[]): number => pieces.reduce((sum, { deflated }) => sum + deflated.length, 0);
 
-/** A plane in one piece, or in two where each is better off with codes of its own. */
+/** Compresses a plane as one section, or as two if separate Huffman codes are smaller. */
 function partsOf(bytes: Uint8Array, at: number, deflate: Deflate): Piece[] {
   const whole = [pieceOf(bytes, deflate)];
   if (at === 0 || at === bytes.length) return whole;
@@ -88,7 +88,7 @@ function partsOf(bytes: Uint8Array, at: number, deflate: Deflate): Piece[] {
   return lengthOf(parts) < lengthOf(whole) ? parts : whole;
 }
 
-/** Pieces one behind the other: those that are alike share their codes. */
+/** Concatenates sections; similar ones share their Huffman codes. */
 class Runs {
   readonly #deflate: Deflate;
   readonly #runs: Piece[] = [];

@@ -1,31 +1,34 @@
 import { CHROMA_CODES } from '@gaussian-splat/renderer/tools';
 import type { SeenSplats } from './seen-splats.js';
 
-/** Of a channel, in steps: what a signed byte holds. */
+/** Maximum steps of a channel: the range of a signed byte. */
 const MOST_STEPS = 127;
-/** What the root of a splat that is seen from everywhere has in its diagonal: 1 / √(4 π). */
+/** Diagonal of the root for a splat that is visible from all directions: 1 / √(4 π). */
 const EVEN_PIVOT = 0.28209479177387814;
-/** A step that costs a bit more has to be worth that much of its square: zeros cost hardly a bit, and of two other numbers the smaller costs less. */
+/**
+ * Minimum reduction of the squared error for a step that costs more bits: zeros cost almost none, and smaller numbers
+ * cost less than larger ones.
+ */
 const [ZERO_PRICE, STEP_PRICE] = [0.24, 0.06];
 
-/** A colour's luma and its differences of colours, red less blue and green less their mean: of most colours these are small. */
+/** Luma of a color and its differences, red minus blue and green minus their mean, which are mostly small. */
 export function differencesOf(sh: Float32Array, at: number): [luma: number, orange: number, green: number] {
   const middle = (sh[at] + sh[at + 2]) / 2;
   return [(middle + sh[at + 1]) / 2, sh[at] - sh[at + 2], sh[at + 1] - middle];
 }
 
 /**
- * Rounds the coefficients of a splat's colour above the constant one, from the last to the first: each makes up for what the rounding of those before it has changed in the colours that the views see (successive
- * cancellation, Babai's nearest plane).
+ * Quantizes the coefficients of a splat's color above the constant one, from the last to the first: each compensates
+ * the rounding of the previous ones in the colors of the views (successive cancellation, Babai's nearest plane).
  */
 export class SeenRounder {
   readonly #seen: SeenSplats | undefined;
   readonly #size: number;
-  /** What rounding added to each coefficient. */
+  /** Rounding error of each coefficient. */
   readonly #added: Float64Array;
   readonly #root: Float64Array;
 
-  /** @param size coefficients of a channel */
+  /** @param size Number of coefficients of a channel. */
   constructor(size: number, seen: SeenSplats | undefined) {
     this.#size = size;
     this.#seen = seen;
@@ -34,9 +37,10 @@ export class SeenRounder {
   }
 
   /**
-   * @param i number of the splat in the cloud; undefined for one that views tell nothing of
-   * @param valuesOf the three numbers of a coefficient, of colours or of what they are made of
-   * @param round gets number `n` of coefficient k, corrected, and how much an error of it weighs, 1 for one that is seen from everywhere; returns what it becomes
+   * @param i Index of the splat in the cloud; undefined if its visibility is unknown.
+   * @param valuesOf Returns the three numbers of a coefficient, as colors or differences.
+   * @param round Is called with number `n` of coefficient k, corrected, and the weight of its error, 1 for a splat that
+   * is visible from all directions; returns the rounded value.
    */
   round(
     i: number | undefined,
@@ -54,13 +58,13 @@ export class SeenRounder {
     }
   }
 
-  /** What the constant coefficient makes up for: to be taken from its three numbers. */
+  /** Correction of the constant coefficient: subtract it from the three numbers. */
   constantShift(): [number, number, number] {
     const pivot = this.#root[0];
     return [this.#shift(0, 0, pivot), this.#shift(0, 1, pivot), this.#shift(0, 2, pivot)];
   }
 
-  /** How much coefficient k has too much already, by what was added to those above it. */
+  /** Excess of coefficient k from the rounding of those above it. */
   #shift(k: number, n: number, pivot: number): number {
     let sum = 0;
     for (let j = k + 1; j < this.#size; j++) sum += this.#root[(j * (j + 1)) / 2 + k] * this.#added[3 * j + n];
@@ -78,14 +82,14 @@ export class SeenRounder {
   }
 }
 
-/** Rounds colours' lumas and differences to steps that fit into bytes. */
+/** Quantizes lumas and color differences with steps that fit into bytes. */
 export class HarmonicRounder {
-  /** Of the last splat: all lumas, then red less blue, then green less their mean. */
+  /** Codes of the last splat: all lumas, then red minus blue, then green minus their mean. */
   readonly codes: Int8Array;
   readonly #rounder: SeenRounder;
   readonly #size: number;
 
-  /** @param size coefficients of a channel */
+  /** @param size Number of coefficients of a channel. */
   constructor(size: number, seen: SeenSplats | undefined) {
     this.#size = size;
     this.#rounder = new SeenRounder(size, seen);
@@ -93,10 +97,10 @@ export class HarmonicRounder {
   }
 
   /**
-   * @param at of the splat's first coefficient in `sh`
-   * @param i its number in the cloud; undefined for one that views tell nothing of
-   * @param step between two lumas
-   * @returns false if some had to be cut
+   * @param at Offset of the splat's first coefficient in `sh`.
+   * @param i Its index in the cloud; undefined if its visibility is unknown.
+   * @param step Step of lumas.
+   * @returns False if some codes were clamped.
    */
   round(sh: Float32Array, at: number, i: number | undefined, step: number): boolean {
     const { codes } = this;
@@ -115,13 +119,13 @@ export class HarmonicRounder {
     return true;
   }
 
-  /** What the constant coefficient makes up for: to be taken from its luma and its differences. */
+  /** Correction of the constant coefficient: subtract it from its luma and its differences. */
   constantShift(): [luma: number, orange: number, green: number] {
     return this.#rounder.constantShift();
   }
 }
 
-/** Whether the channels that a luma and differences make are bytes. */
+/** Whether the channels of a luma and differences fit bytes. */
 function fits(luma: number, orange: number, green: number): boolean {
   const [rest, half] = [Math.abs(luma - (CHROMA_CODES / 2) * green), (CHROMA_CODES / 2) * Math.abs(orange)];
   return (
@@ -131,7 +135,7 @@ function fits(luma: number, orange: number, green: number): boolean {
   );
 }
 
-/** A whole number of steps, from which a smaller one is near enough where an error weighs little. */
+/** Rounds to a number of steps, with a bias towards smaller ones if an error has little weight. */
 export function roundedBy(size: number, weight: number): number {
   const code = Math.floor(size + 0.5 - STEP_PRICE / 2 / weight);
   if (code > 1) return code;

@@ -1,21 +1,28 @@
-/** How views see the splats of a cloud, by their numbers in it. */
+/** Visibility of the splats of a cloud, by their indices in it. */
 export interface SeenSplats {
-  /** [N] mean over the views of the sum of the squares of a splat's weights, as a share of the pixels; 0 where no view sees it. */
+  /**
+   * [N] mean over the views of the sum of a splat's squared weights, as a fraction of the pixels; 0 if no view shows
+   * it.
+   */
   readonly energies: Float32Array;
   /**
-   * [N, n (n + 1) / 2] with n coefficients: the lower triangular root, rows outermost, of the mean of Y Yᵀ over what the views see of a splat, with Y the basis functions in the direction of each view. Empty where that is not known, and at degree 0.
+   * [N, n (n + 1) / 2] with n coefficients: the lower triangular root, row-major, of the visibility-weighted mean of Y
+   * Yᵀ over the views, with Y the basis functions in the direction of each view. Empty if unknown, and at degree 0.
    */
   readonly roots: Float32Array;
 }
 
-/** What no view shows of a splat may still be seen from elsewhere: its share of the energy that it would have in plain sight. */
+/**
+ * Minimum energy of a splat, as a fraction of that of an unoccluded one, because hidden splats may be visible from
+ * other views.
+ */
 const LEAST_SHARE = 1 / 64;
 
 /**
- * How much an error of each splat's colour counts.
- * @param usual [N] what opacities and sizes tell of it: squares of opacities, times areas
- * @param energies [N] of {@link SeenSplats}
- * @returns the energies, none of them too small; and what a usual number has to be multiplied by to be compared with them
+ * Weight of a color error of each splat.
+ * @param usual [N] estimate from opacities and sizes: squared opacities times areas.
+ * @param energies [N] of {@link SplatVisibility}.
+ * @returns The energies with a lower limit; and the factor that converts estimates to energies.
  */
 export function weighSplats(usual: Float32Array, energies: Float32Array): { weights: Float32Array; unit: number } {
   const ratios = energies.map((energy, i) => (usual[i] > 0 ? energy / usual[i] : 0)).sort();

@@ -1,23 +1,27 @@
 import { constants, isOfPlanes, sampleAxis } from '@gaussian-splat/renderer/tools';
 
 const { CULL_GROUP } = constants;
-/** Splats within so many median distances from the median, along each axis, are one shell; every other shell reaches twice as far as the one before. */
+/**
+ * Splats within this many median distances from the median, along each axis, form the first shell; every other shell
+ * reaches twice as far as the previous one.
+ */
 const FIRST_REACH = 8;
 const MOST_SHELLS = 256;
 
-/** An order of splats in chunks, and which places of it are filled up. */
+/** An order of splats in chunks, with its padding. */
 export interface ShellOrder {
-  /** Indices of splats; those of {@link fillers} name one that is there already. */
+  /** Indices of splats; {@link fillers} repeat an index. */
   readonly order: Uint32Array;
-  /** Places that splats of opacity 0 take, so that the next one begins a chunk. */
+  /** Positions of padding splats with opacity 0, so that the next splat starts a chunk. */
   readonly fillers: readonly number[];
 }
 
 /**
- * Splats far off have chunks of their own, so that coordinates relative to a chunk are as fine as those near by need: no chunk holds splats of other than two neighbouring shells around the middle of
- * the scene. Within a shell the order stays. A scene of planes keeps all of it.
+ * Gives distant splats separate chunks, so that chunk-relative coordinates stay fine for near ones: a chunk contains
+ * only splats of two neighboring shells around the center of the scene. The order within a shell does not change. A
+ * scene of planes keeps its order.
  * @param positions [3 N] world units
- * @param kept indices of splats, neighbours side by side; not changed
+ * @param kept Indices of splats, neighbors adjacent; not changed.
  */
 export function shellOrder(positions: Float32Array, kept: Uint32Array): ShellOrder {
   if (kept.length === 0 || isOfPlanes(positions, kept)) return { order: kept, fillers: [] };
@@ -26,7 +30,7 @@ export function shellOrder(positions: Float32Array, kept: Uint32Array): ShellOrd
   return isOne ? { order: kept, fillers: [] } : filledUp(kept, shells, counts);
 }
 
-/** The shell of each splat, and how many each has. */
+/** Shell of each splat, and their counts. */
 function shellsOf(positions: Float32Array, kept: Uint32Array): { shells: Uint8Array; counts: Uint32Array } {
   const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
   const shells = new Uint8Array(kept.length);
@@ -43,11 +47,13 @@ function shellsOf(positions: Float32Array, kept: Uint32Array): { shells: Uint8Ar
   return { shells, counts };
 }
 
-/** Shell after shell; where one begins within a chunk of another than the one before, that chunk is filled up first. */
+/**
+ * Concatenates shells; if one starts within a chunk of a shell other than the previous one, that chunk is padded first.
+ */
 function filledUp(kept: Uint32Array, shells: Uint8Array, counts: Uint32Array): ShellOrder {
   const starts = new Uint32Array(MOST_SHELLS);
   const fillers: number[] = [];
-  // The innermost shell of the chunk that is open.
+  // The innermost shell of the open chunk.
   let [end, open, innermost] = [0, 0, 0];
   counts.forEach((count, shell) => {
     if (count === 0) return;

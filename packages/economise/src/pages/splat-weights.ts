@@ -1,10 +1,10 @@
 import { FACTOR_NUMBERS, rowLengths, type SplatLevel } from '@gaussian-splat/renderer/tools';
 import { weighSplats } from './seen-splats.js';
 
-/** The share of splats that weigh less than the one that the first class is of. */
+/** Rank of the weight, as a fraction of the splats, that defines the first class. */
 const REFERENCE_RANK = 0.9;
 
-/** How much an error of a splat's colour adds to the squared error of pictures: the square of its opacity, times the area that it covers. */
+/** Contribution of a splat's color error to the squared error of images: its squared opacity times its area. */
 function weightOf({ factors, opacities }: SplatLevel, i: number): number {
   const lengths = new Float64Array(3);
   rowLengths(factors, FACTOR_NUMBERS * i, lengths);
@@ -12,13 +12,13 @@ function weightOf({ factors, opacities }: SplatLevel, i: number): number {
   return opacities[i] ** 2 * lengths[1] * lengths[2];
 }
 
-/** How many octaves splats weigh less than those that show much. */
+/** Weights of splats in octaves below the most visible ones. */
 export class SplatWeights {
   readonly #leaves: SplatLevel;
-  /** Of the leaves. */
+  /** Weights of the leaves. */
   readonly #weights: Float32Array;
   readonly #unit: number;
-  /** The weight that the first class is of. */
+  /** Weight of the first class. */
   readonly #reference: number;
 
   constructor(leaves: SplatLevel, energies: Float32Array | undefined) {
@@ -35,5 +35,5 @@ export class SplatWeights {
   }
 }
 
-/** The number of a level's splat in the arrays that its harmonics are in. */
+/** Index of a level's splat in the arrays of its harmonics. */
 export const numberOf = ({ shOrder }: SplatLevel, i: number): number => (shOrder ? shOrder[i] : i);

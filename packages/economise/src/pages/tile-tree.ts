@@ -12,7 +12,10 @@ import { treeOf, type DetailTree } from './build-pages.js';
 
 const { CULL_GROUP } = constants;
 
-/** The tree above copies of another: its finest level has the coarsest chunk of each copy, in the order of `places`. */
+/**
+ * Builds the tree above copies of another: its finest level has the coarsest chunk of each copy, in the order of
+ * `places`.
+ */
 export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): DetailTree {
   const top = tree.levels.length - 1;
   const finest = copiesOf(tree.levels[top], places);
@@ -33,7 +36,7 @@ export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): Deta
   };
 }
 
-/** Each copy fills a chunk; splats that make it full cover nothing. */
+/** Each copy fills a chunk; padding splats are transparent. */
 function copiesOf(root: SplatLevel, places: readonly Vector3[]): SplatLevel {
   const level = emptyLevel(CULL_GROUP * places.length, root);
   const stride = shNumbers(root.shDegree);

@@ -1,9 +1,9 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 
-/** Allocates memory that tasks share with the thread that asks for them. */
+/** Allocates memory that tasks share with their caller. */
 export type Allocator = { allocate(byteLength: number): ArrayBufferLike };
 
-/** Splats `first` to `end`, the latter not included. */
+/** Splats `first` to `end`, excluding the latter. */
 export interface Part {
   readonly first: number;
   readonly end: number;
@@ -12,7 +12,7 @@ export interface Part {
 /** The columns of a cloud. */
 export type Columns = Pick<GaussianCloud, 'positions' | 'scales' | 'rotations' | 'opacities' | 'sh' | 'shDegree'>;
 
-/** The columns alone. */
+/** Only the columns. */
 export function columnsOf({ positions, scales, rotations, opacities, sh, shDegree }: GaussianCloud): Columns {
   return { positions, scales, rotations, opacities, sh, shDegree };
 }
@@ -27,7 +27,7 @@ const widthsOf = (degree: ShDegree) =>
   ({ positions: 3, scales: 3, rotations: 4, opacities: 1, sh: 3 * shCoefficientCount(degree) }) as const;
 
 /**
- * Columns of zeros in memory that tasks share.
+ * Allocates zeroed columns in memory that tasks share.
  * @throws GaussianSplatError `out-of-memory/allocation`
  */
 export function allocateColumns(count: number, shDegree: ShDegree, pool: Allocator): Columns {
@@ -51,7 +51,7 @@ export function allocateColumns(count: number, shDegree: ShDegree, pool: Allocat
   }
 }
 
-/** Copies a cloud into columns of its degree or a higher one, from splat `at` on. Coefficients that it lacks stay as they are. */
+/** Copies a cloud to columns of its degree or a higher one, from splat `at` on. Missing coefficients stay unchanged. */
 export function putCloud(cloud: GaussianCloud, to: Columns, at: number): void {
   to.positions.set(cloud.positions, 3 * at);
   to.scales.set(cloud.scales, 3 * at);
@@ -68,9 +68,9 @@ export function putCloud(cloud: GaussianCloud, to: Columns, at: number): void {
 }
 
 /**
- * Moves splats together where parts hold fewer than they have room for.
- * @param runs where the splats of each part begin, and how many there are
- * @returns columns as long as all of them together: the same memory
+ * Compacts the splats of parts that are smaller than their reserved range.
+ * @param runs Start and number of the splats of each part.
+ * @returns Columns of the total length, in the same memory.
  */
 export function closeGaps(
   columns: Columns,

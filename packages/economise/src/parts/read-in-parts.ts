@@ -5,7 +5,7 @@ import type { PartRead } from './read-part.js';
 import type { Part } from './cloud-memory.js';
 import { partsOf, poolFor, type TaskPool } from './task-pool.js';
 
-/** Reads a scene in memory as `readScene` does, in parts where its format and the pool allow. */
+/** Reads a scene in memory as `readScene` does, in parallel if its format and the pool allow it. */
 export async function readInParts(
   bytes: Uint8Array,
   options: { readonly name: string; readonly signal?: AbortSignal },
@@ -27,9 +27,10 @@ export async function readInParts(
 }
 
 /**
- * Has the splats of a file read part by part into memory that tasks share.
- * @param readAll reads parts into columns, as `readBlocks` does
- * @returns undefined if the scene is too small for parts, or so much of it cannot be drawn that those should say why who read it whole
+ * Reads the splats of a file part by part into memory that tasks share.
+ * @param readAll Reads parts into columns, as `readBlocks` does.
+ * @returns Undefined if the scene is too small for parts, or too much of it is unusable, so that reading it as a whole
+ * reports the reasons.
  */
 export async function gatherParts(
   { count, shDegree }: SplatRanges,

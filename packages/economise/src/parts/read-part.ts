@@ -2,23 +2,23 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { readSplats } from '@gaussian-splat/formats';
 import { putCloud, type Columns, type Part } from './cloud-memory.js';
 
-/** So many splats are read at once: few enough for their numbers to be in the cache still when they are put in their places. */
+/** Splats read at once: few enough to stay in the cache until they are copied. */
 const BLOCK = 1 << 14;
 
-/** What a part was found to hold. */
+/** Result of reading a part. */
 export interface PartRead {
-  /** Splats that can be drawn; they stand together at the beginning of the part's places. */
+  /** Number of usable splats; they are contiguous at the beginning of the part's range. */
   readonly count: number;
   readonly antialiased: boolean;
   readonly filterVariance: number | undefined;
   readonly hints: GaussianCloud['hints'];
-  /** Of its splats: see `GaussianCloud.faults`. */
+  /** Faults of its splats: see `GaussianCloud.faults`. */
   readonly faults: readonly number[];
-  /** Of the file: see `GaussianCloud.warnings`. */
+  /** Warnings of the file: see `GaussianCloud.warnings`. */
   readonly warnings: readonly string[];
 }
 
-/** Reads a part of a file block by block into columns, the places of the part's splats there being their numbers in the file. */
+/** Reads a part of a file block by block into columns, at the indices of its splats in the file. */
 export async function readBlocks(
   { first, end }: Part,
   to: Columns,
@@ -43,7 +43,7 @@ export async function readBlocks(
   return { count, antialiased, filterVariance, hints, faults, warnings: [...warnings] };
 }
 
-/** Reads a part of a file that lies in memory. */
+/** Reads a part of a file in memory. */
 export function readPart(input: {
   readonly bytes: Uint8Array;
   readonly name: string;

@@ -3,27 +3,27 @@ import { tasks } from './tasks.js';
 
 export type { Part };
 
-/** The tasks of this package, by their names: functions of plain data and typed arrays, which another thread can call. */
+/** The tasks of this package by name: functions of plain data and typed arrays, which another thread can call. */
 export type Tasks = typeof tasks;
 export type TaskName = keyof Tasks;
 export type TaskInput<Name extends TaskName> = Parameters<Tasks[Name]>[0];
 export type TaskResult<Name extends TaskName> = Awaited<ReturnType<Tasks[Name]>>;
 
-/** Where work is done that comes in parts. {@link inline} does it where it is asked for; a host that has threads gives another. */
+/** Runs parallel tasks. {@link inline} runs them on the calling thread; hosts with threads provide another pool. */
 export interface TaskPool {
-  /** How many parts are done at the same time. */
+  /** Number of tasks that run in parallel. */
   readonly size: number;
-  /** Work on fewer splats is done sooner by the thread that has it than here. */
+  /** Smaller numbers of splats are processed faster by the calling thread. */
   readonly leastSplats: number;
-  /** Memory that tasks share with the thread that asks for them. */
+  /** Memory that tasks share with their caller. */
   allocate(byteLength: number): ArrayBufferLike;
-  /** True if tasks see this memory as it is, and write to it. */
+  /** Whether tasks can access this memory directly. */
   shares(memory: ArrayBufferLike): boolean;
-  /** Does a task with each of some inputs. Rejects with the first one's error, once all have ended. */
+  /** Runs a task with each of several inputs. Rejects with the first error, once all have ended. */
   run<Name extends TaskName>(name: Name, inputs: readonly TaskInput<Name>[]): Promise<TaskResult<Name>[]>;
 }
 
-/** Does one part after another, in this thread. */
+/** Runs one task after another, on this thread. */
 export const inline: TaskPool = {
   size: 1,
   leastSplats: 0,
@@ -37,10 +37,10 @@ export const inline: TaskPool = {
   },
 };
 
-/** Parts of {@link TaskPool.leastSplats} that are a part of their own at least. */
+/** Minimum size of a part, as a fraction of {@link TaskPool.leastSplats}. */
 const LEAST_SHARE = 1 / 8;
 
-/** So many splats in parts of one size, but for the last. None if there are no splats. */
+/** Divides splats into parts of equal size, except the last. Empty without splats. */
 export function partsOf(count: number, { size, leastSplats }: TaskPool): Part[] {
   const wanted = Math.min(size, Math.floor(count / Math.max(1, LEAST_SHARE * leastSplats)));
   const step = Math.ceil(count / Math.max(1, wanted));
@@ -49,7 +49,7 @@ export function partsOf(count: number, { size, leastSplats }: TaskPool): Part[] 
   return parts;
 }
 
-/** The pool, or none for work that is too small for it, or where its tasks would get copies of what arrays hold. */
+/** Returns the pool, or {@link inline} for work that is too small, or if tasks would receive copies of the arrays. */
 export function poolFor(pool: TaskPool, count: number, arrays: readonly ArrayBufferView[] = []): TaskPool {
   return count >= pool.leastSplats && arrays.every(({ buffer }) => pool.shares(buffer)) ? pool : inline;
 }

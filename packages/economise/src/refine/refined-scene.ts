@@ -19,30 +19,36 @@ import type { ReducedCloud } from '../reduce.js';
 
 const { CULL_GROUP, SHAPE_LOG_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;
 const FLOAT_BYTES = 4;
-/** Logits beyond it are opacities of 0 or 1 in float32, and scales below it of no size: what has no finite logarithm gets one. */
+/**
+ * Clamps for parameters without a finite logarithm: beyond these logits opacities are 0 or 1 in float32, and below this
+ * scale a splat has no size.
+ */
 const MOST_LOGIT = 15;
 const LEAST_SCALE = 1e-20;
 
-/** A page of splats whose numbers are sought. */
+/** A block of splats whose parameters are optimized. */
 export interface RefinedPart {
   readonly page: GaussianPage;
-  /** Number of its first splat among all, which is a multiple of 256. */
+  /** Index of its first splat among all, which is a multiple of 256. */
   readonly first: number;
-  /** Splats in whole chunks: from one row of `gradients` and `means` to the next. */
+  /** Splats in whole chunks: the stride between rows of `gradients` and `means`. */
   readonly row: number;
-  /** array<f32>: what shaders/shared/refined.wgsl has of each splat. */
+  /** array<f32>: parameters of each splat, in the layout of shaders/shared/refined.wgsl. */
   readonly numbers: GPUBuffer;
   /** array<u32>: the degree that each splat keeps. */
   readonly degrees: GPUBuffer;
-  /** array<f32> and array<vec2f>: a row for each number that is sought. */
+  /** array<f32> and array<vec2f>: a row for each optimized parameter. */
   readonly gradients: GPUBuffer;
   readonly means: GPUBuffer;
-  /** array<vec4f>: of each splat the largest curvatures in a view. */
+  /** array<vec4f>: the largest curvatures of each splat in any view. */
   readonly bends: GPUBuffer;
   readonly packing: GPUBindGroup;
 }
 
-/** A cloud on the GPU whose numbers change from picture to picture: float32 numbers, and the packed splats that the renderer draws. */
+/**
+ * A cloud on the GPU whose parameters are optimized from image to image: float32 parameters, and the packed splats for
+ * the renderer.
+ */
 export class RefinedScene implements GaussianScene {
   readonly count: number;
   readonly shDegree: GaussianScene['shDegree'];
@@ -52,7 +58,7 @@ export class RefinedScene implements GaussianScene {
   readonly origin: GaussianScene['origin'];
   readonly pages: readonly GaussianPage[];
   readonly parts: readonly RefinedPart[];
-  /** array<vec2i>: SCREEN_NUMBERS of each splat in fixed point, of every page whole chunks. */
+  /** array<vec2i>: SCREEN_NUMBERS of each splat in fixed point, with every block rounded up to whole chunks. */
   readonly screen: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
@@ -93,8 +99,9 @@ export class RefinedScene implements GaussianScene {
   }
 
   /**
-   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each number of a splat, some 1.2 kB at degree 3 with what is drawn.
-   * @param mostSplats of a page; default what the device's limits allow
+   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each parameter of a splat, about 1.2 kB at degree 3
+   * including the drawn splats.
+   * @param mostSplats Maximum of a block; default: the limits of the device.
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async of(
@@ -120,13 +127,13 @@ export class RefinedScene implements GaussianScene {
     return this.#version;
   }
 
-  /** Makes what is drawn from the numbers. To be recorded after whatever changed them. */
+  /** Packs the parameters for drawing. Record it after every change of them. */
   pack(pass: GPUComputePassEncoder): void {
     for (const { packing, page } of this.parts) this.#ingest.record(pass, packing, page.count);
     this.#version++;
   }
 
-  /** The cloud as the numbers are now. */
+  /** Reads back the cloud with its current parameters. */
   async read(): Promise<GaussianCloud> {
     const width = this.#width;
     const read = await readBack(
@@ -190,7 +197,7 @@ export class RefinedScene implements GaussianScene {
     };
   }
 
-  /** `Ingest` of rows of numbers. */
+  /** `Ingest` parameters for rows of parameters. */
   #ingestOf(count: number): ArrayBuffer {
     const bytes = new ArrayBuffer(Ingest.size);
     const width = this.#width;
@@ -213,7 +220,7 @@ export class RefinedScene implements GaussianScene {
   }
 }
 
-/** [count, width] the numbers of some splats. */
+/** [count, width] parameters of some splats. */
 function numbersOf(cloud: GaussianCloud, begin: number, count: number, width: number): Float32Array<ArrayBuffer> {
   const rows = new Float32Array(width * count);
   for (let k = 0, at = 0; k < count; k++, at += width) {

@@ -13,20 +13,24 @@ import { SceneFitter, USUAL_DESCENT, type Descent } from './scene-fitter.js';
 import { LEFT_BY_REFINING } from './search-refined.js';
 
 export interface RefiningOptions {
-  /** Draws the images that splats are fitted to, and goes over them backwards. */
+  /** Draws the reference images, and runs the backward passes. */
   readonly device: GPUDevice;
-  /** Views of these images: those that splats are scored in. None of them may be searched or held out. */
+  /** Views of these images: the scoring views. None of them may be a search or held-out view. */
   readonly views: readonly Camera[];
-  /** How splats are fitted; what is left out is as usual. */
+  /** Optimizer options; missing ones have defaults. */
   readonly descent?: Partial<Descent>;
 }
 
 /**
- * An evaluator whose cuts can be refined, besides what another one does: the splats that stay are fitted to images of the whole scene, by gradient descent through the rasterizer. The images stay on the
- * GPU: 16 bytes for each pixel of the views. A splat takes 1.2 kB there at degree 3 while it is fitted.
+ * An evaluator that refines the cuts of another one: the remaining splats are fitted to images of the whole scene, by
+ * gradient descent through the rasterizer. The images stay on the GPU: 16 bytes for each pixel of the views. A splat
+ * takes 1.2 kB there at degree 3 during the fit.
  */
 export class RefiningEvaluator implements Evaluator {
-  /** Part of the error of drops and merges that is taken to be left by refining: merges must be found up to this much more (`MergingOptions.mostError`). */
+  /**
+   * Assumed fraction of the error of drops and merges after refinement: merges must be found up to a correspondingly
+   * higher error (`MergingOptions.mostError`).
+   */
   static readonly leftByRefining = LEFT_BY_REFINING;
   readonly #inner: Evaluator;
   readonly #cloud: GaussianCloud;
@@ -35,8 +39,8 @@ export class RefiningEvaluator implements Evaluator {
   #pictures: Promise<PictureErrors> | undefined;
 
   /**
-   * @param inner is destroyed with this one
-   * @param cloud the one that `inner` looks at
+   * @param inner Is destroyed with this one.
+   * @param cloud The cloud that `inner` evaluates.
    * @throws GaussianSplatError `unsupported/no-webgpu` without a device; `argument/value` without a view
    */
   constructor(inner: Evaluator, cloud: GaussianCloud, options: RefiningOptions) {
@@ -79,14 +83,14 @@ export class RefiningEvaluator implements Evaluator {
     const { device, descent } = this.#options;
     const pictures = await (this.#pictures ??= this.#draw());
     signal?.throwIfAborted();
-    // Nothing to come near to.
+    // There is no reference to fit.
     if (pictures.covered.every((pixels) => pixels === 0)) return reduced;
     const scene = await RefinedScene.of(device, reduced);
     try {
       const fitter = new SceneFitter(device, this.#viewpoint, scene, pictures);
       try {
         const before = await fitter.fit({ ...USUAL_DESCENT, ...descent }, signal);
-        // Few steps, or steps that are too large, may lead away.
+        // Too few or too large steps may increase the error.
         if (mean(await pictures.measure(scene)) >= mean(before)) return reduced;
       } finally {
         fitter.destroy();

@@ -24,46 +24,49 @@ import { show } from '../gpu/show.js';
 import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';
 
-/** Nothing besides the image: what a frame was painted from is enough. */
+/** No targets: only the rasterization inputs of a frame are needed. */
 const AUXILIARY = new AuxiliaryOutputs();
-/** Bindings begin at multiples of 256 bytes. */
+/** Bindings are aligned to 256 bytes. */
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 const SMALL_STRIDE = 256;
-/** Mean squared error that the rates are for: 51 dB. Nearer pictures are approached in smaller steps, as their root is. */
+/** The rates are tuned for this mean squared error, 51 dB. Smaller errors scale the steps by their square root. */
 const USUAL_ERROR = 10 ** -5.1;
-/** Views after which the CPU waits for the GPU. */
+/** Number of views after which the CPU waits for the GPU. */
 const AHEAD = 16;
 
-/** How far a step goes along each kind of number: Adam's rates at the beginning. */
+/** Initial learning rates of Adam for each kind of parameter. */
 export interface Rates {
-  /** In sizes of the splat along its own axes. Those that are large or near to an eye are not moved. */
+  /** In sizes of the splat along its own axes. Large or near splats are not moved. */
   readonly position: number;
-  /** Of the logarithms of the scales. */
+  /** Learning rate of log scales. */
   readonly growth: number;
   /** Radians about the splat's own axes. */
   readonly turn: number;
   readonly logit: number;
-  /** Of the coefficients of degree 0, and of the others. */
+  /** Learning rates of the coefficients of degree 0, and of the others. */
   readonly constant: number;
   readonly harmonic: number;
 }
 
-/** How splats are fitted. */
+/** Options of the optimizer. */
 export interface Descent {
   readonly steps: number;
-  /** Views whose derivatives make a step. */
+  /** Views in each step. */
   readonly viewsAtOnce: number;
   readonly rates: Rates;
-  /** What is left of the rates at the end: they fall by the same part from step to step. */
+  /** Final fraction of the rates, which decay exponentially. */
   readonly lastRate: number;
-  /** What is left of Adam's means of derivatives and of their squares from step to step. */
+  /** Decay factors of Adam's running means of derivatives and of their squares. */
   readonly keepMean: number;
   readonly keepSquare: number;
-  /** Derivatives far below this move little: of the squared error of an image, over all its pixels. */
+  /**
+   * Epsilon of Adam: derivatives of the squared error, summed over the pixels of an image, far below it change little.
+   */
   readonly least: number;
   /**
-   * Part of Newton's step, along one number alone and by the largest curvature in a view, beyond which none goes. Adam's steps are as long where derivatives are small: of a splat
-   * that fills one view and shows little in the others these would lead it anywhere.
+   * Limit of a step as a fraction of Newton's step along one parameter, with the largest curvature in any view. Adam
+   * takes steps of the same length for small derivatives: they would move a splat that fills one view and is barely
+   * visible in the others arbitrarily.
    */
   readonly newton: number;
 }
@@ -73,7 +76,7 @@ export const USUAL_DESCENT: Descent = {
   rates: { position: 0.003, growth: 0.003, turn: 0.003, logit: 0.02, constant: 0.005, harmonic: 0.001 },
 };
 
-/** Fits the splats of a scene to pictures by gradient descent. */
+/** Fits the splats of a scene to images by gradient descent. */
 export class SceneFitter {
   readonly #device: GPUDevice;
   readonly #viewpoint: Viewpoint;
@@ -84,7 +87,7 @@ export class SceneFitter {
   readonly #refineViews: GPUBuffer;
   readonly #steps: readonly GPUBuffer[];
 
-  /** @param errors the pictures to come near to */
+  /** @param errors The reference images. */
   constructor(device: GPUDevice, viewpoint: Viewpoint, scene: RefinedScene, errors: PictureErrors) {
     this.#device = device;
     this.#viewpoint = viewpoint;
@@ -98,10 +101,10 @@ export class SceneFitter {
     );
   }
 
-  /** Goes down, for so many steps. @returns [views] errors before */
+  /** Runs the optimizer steps. @returns [views] initial errors */
   async fit(descent: Descent, signal?: AbortSignal): Promise<readonly number[]> {
     const { steps, viewsAtOnce, lastRate } = descent;
-    // Draws all views until the viewpoint has room for the scene: what lacks splats has wrong derivatives.
+    // Draws all views until the scene fits the viewpoint's capacity, because missing splats give wrong derivatives.
     const before = await this.#errors.measure(this.#scene);
     const pace = Math.min(1, Math.sqrt(mean(before) / USUAL_ERROR));
     const order = viewOrder(this.#errors.exhibits.length);
@@ -151,7 +154,7 @@ export class SceneFitter {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Looks at all views for the curvatures alone, before anything moves. */
+  /** Runs all views once for the curvatures only, before the first step. */
   async #survey(signal: AbortSignal | undefined): Promise<void> {
     for (let view = 0; view < this.#errors.exhibits.length; view++) {
       signal?.throwIfAborted();
@@ -167,7 +170,7 @@ export class SceneFitter {
     this.#memory.destroy();
   }
 
-  /** @param number of the step, from 1 on @param share of the rates that is left */
+  /** @param number Of the step, from 1 on. @param share Remaining fraction of the rates. */
   #step(number: number, share: number, { rates, keepMean, keepSquare, least, newton }: Descent): void {
     const kernel = rareKernelOf(this.#device, refineStep);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
@@ -221,7 +224,7 @@ export class SceneFitter {
   }
 }
 
-/** All views, those far apart in the list next to one another. */
+/** All views, ordered so that consecutive ones are far apart in the list. */
 function viewOrder(count: number): number[] {
   const gcd = (a: number, b: number): number => (b === 0 ? a : gcd(b, a % b));
   let step = Math.max(1, Math.round(0.618 * count));

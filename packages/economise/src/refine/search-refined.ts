@@ -5,37 +5,40 @@ import { decibels, errorTogether } from '../measure.js';
 import type { Cut, ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
 
-/** Part of the error of drops and merges that is taken to be left by refining: the search is of cuts that err so much more, and what is really left is measured. */
+/**
+ * Assumed fraction of the error of drops and merges after refinement: the search allows a correspondingly larger error,
+ * and the real one is measured.
+ */
 export const LEFT_BY_REFINING = 0.4;
-/** Cuts that are refined, and how near to the figure one must come. */
+/** Number of cuts to refine, and the fraction of the allowed error that ends the search. */
 const TRIES = 4;
 const NEAR_ENOUGH = 0.97;
-/** From one that fits to one that does not, in parts: what lies between is not worth another. */
+/** Ratio between a cut that fits and one that does not, below which the search ends. */
 const NARROW = 1.03;
-/** How the error may grow with the one that is allowed, both as logarithms: what two tries tell beyond it is noise. */
+/** Range of the exponent of the error as a function of the budget: estimates from two tries outside it are noise. */
 const [LEAST_SLOPE, MOST_SLOPE] = [0.5, 2];
 
-/** How much is cut, and whether what that leaves is refined. */
+/** Size of the cut, and whether to refine it. */
 export interface Plan {
   readonly trades: Trades;
-  /** Error that the search allows, in parts of the one that was asked for. */
+  /** Budget of the search, relative to the requested error. */
   readonly filling: number;
   readonly isRefined: boolean;
 }
 
-/** A cut, and what it leaves. */
+/** A cut, and the resulting cloud. */
 export interface CutCloud {
   readonly cut: Cut;
   readonly reduced: ReducedCloud;
 }
 
-/** What came of a filling. */
+/** Result of a try. */
 interface Tried {
   readonly filling: number;
   readonly error: number;
 }
 
-/** Makes a cut, and refines what it leaves where that is planned. */
+/** Applies a cut, and refines the result if planned. */
 export async function cutCloud(
   { trades, filling, isRefined }: Plan,
   evaluator: Evaluator,
@@ -48,8 +51,9 @@ export async function cutCloud(
 }
 
 /**
- * The largest cut, of a few, that errs no more than is asked once it is refined: neither in the searched views nor in those that are held out, which can only ask for less. None of them was fitted to.
- * @returns undefined if all err more
+ * Finds the largest of a few cuts whose error after refinement is within the limit: in the search views and in the
+ * held-out views, which can only reduce it. None of them was used for fitting.
+ * @returns Undefined if all exceed it.
  */
 export async function searchRefined(
   cloud: GaussianCloud,
@@ -83,14 +87,14 @@ export async function searchRefined(
   return best;
 }
 
-/** The largest that has been found to err no more than is asked (0 if none has), and the smallest that errs more. */
+/** The largest budget within the error limit (0 if there is none), and the smallest that exceeds it. */
 function bracketOf(tried: readonly Tried[], budget: number): [number, number] {
   const fits = Math.max(0, ...tried.filter(({ error }) => error <= budget).map(({ filling }) => filling));
   const fails = Math.min(Infinity, ...tried.filter(({ error }) => error > budget).map(({ filling }) => filling));
   return [fits, fails];
 }
 
-/** Where the error should come to what is asked, by the last two tries, and between those that have been found to err less and more. */
+/** Extrapolates the budget for the requested error from the last two tries, limited to the bracket. */
 function nextFilling(tried: readonly Tried[], budget: number): number {
   const [last, before] = [tried[tried.length - 1], tried[tried.length - 2]];
   const measured = before && Math.log(last.error / before.error) / Math.log(last.filling / before.filling);

@@ -5,32 +5,35 @@ import type { Columns } from '../parts/cloud-memory.js';
 export const EXTENSION = 'KHR_gaussian_splatting';
 
 /**
- * Signs of the coefficients of degrees 0 to 3 under the half turn about z that leads from a cloud's axes (right, down, forward) to
+ * Signs of the coefficients of degrees 0 to 3 under the half turn about z from a cloud's axes (right, down, forward) to
  * glTF's (left, up, forward).
  */
 const HALF_TURN = [1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1];
 
-/** The same turn of places. */
+/** The same rotation of positions. */
 const PLACE_SIGNS = [-1, -1, 1];
 
-/** Splats are visited in blocks of this many, so that their rows stay in the cache while column after column of them is written. */
+/**
+ * Splats are processed in blocks of this size, so that their rows stay in the cache while column after column of them
+ * is written.
+ */
 const BLOCK = 256;
 
 type Numbers = Float32Array | Int16Array;
 
-/** What a primitive says of each of its splats: an attribute of glTF. A splat takes whole words of each. */
+/** A glTF attribute of a primitive of splats. Each splat takes whole words of it. */
 export interface GlbColumn {
   readonly name: string;
   readonly width: number;
   readonly isShort?: boolean;
-  /** Writes the numbers of some splats from the beginning of `out` on. */
+  /** Writes the attribute of some splats from the beginning of `out` on. */
   readonly put: (out: Numbers, splats: Uint32Array) => void;
 }
 
-/** The attributes of splats that keep one degree. */
+/** The attributes of splats that keep the same degree. */
 export function glbColumns(columns: Columns, degree: number): GlbColumn[] {
   const { positions, rotations, opacities, scales, sh, shDegree } = columns;
-  /** Some numbers of the splats' rows, each times a sign. */
+  /** Part of the splats' rows, multiplied by a sign. */
   const plain = (name: string, values: Float32Array, stride: number, at: number, width: number, sign = 1) => ({
     name: `${EXTENSION}:${name}`,
     width,
@@ -60,7 +63,7 @@ export function glbColumns(columns: Columns, degree: number): GlbColumn[] {
   ];
 }
 
-/** A point in glTF's axes. */
+/** Converts a point to glTF's axes. */
 export const placeOf = (point: Vector3): number[] => point.map((x, axis) => PLACE_SIGNS[axis] * x);
 
 /** Positions relative to the cloud's origin, in glTF's axes. */
@@ -72,7 +75,7 @@ function putPlaces(positions: Float32Array, out: Numbers, splats: Uint32Array): 
   }
 }
 
-/** The bounds of positions that glTF asks for: of what {@link glbColumns} writes. */
+/** The bounds of positions that glTF requires, for the output of {@link glbColumns}. */
 export function placeBounds({ positions }: Columns, splats: Uint32Array): object {
   const [min, max] = [new Array<number>(3), new Array<number>(3)];
   for (let axis = 0; axis < 3; axis++) {
@@ -98,15 +101,15 @@ function putRotations(rotations: Float32Array, out: Numbers, splats: Uint32Array
   }
 }
 
-/** Some splats of a primitive, and where in the file they go. */
+/** Some splats of a primitive, and their destination in the file. */
 export interface ColumnsToPut {
   readonly columns: Columns;
   readonly degree: number;
   readonly splats: Uint32Array;
-  /** Place of the first of them in the primitive. */
+  /** Index of the first of them in the primitive. */
   readonly at: number;
   readonly bytes: Uint8Array;
-  /** Byte of the file where each attribute of the primitive begins. */
+  /** Offset in the file of each attribute of the primitive. */
   readonly starts: readonly number[];
 }
 

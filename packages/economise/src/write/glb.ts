@@ -7,7 +7,7 @@ import { EXTENSION, glbColumns, placeBounds, placeOf, type GlbColumn } from './g
 
 const [FLOAT, SHORT] = [5126, 5122];
 
-/** What the extension says of every primitive. */
+/** Properties of the extension in every primitive. */
 const SPLATS = {
   kernel: 'ellipse',
   colorSpace: 'srgb_rec709_display',
@@ -24,12 +24,13 @@ interface Primitive {
 }
 
 /**
- * Writes GLB with `KHR_gaussian_splatting`: one primitive for each degree that splats keep, so that coefficients which went take no
- * bytes. Rotations are 16-bit normalised integers, which the extension allows; all else is float32.
+ * Writes GLB with `KHR_gaussian_splatting`: one primitive for each degree that splats keep, so that dropped
+ * coefficients take no bytes. Rotations are 16-bit normalized integers, which the extension allows; everything else is
+ * float32.
  *
- * A scene with another up than (0, -1, 0) is turned.
+ * A scene with an up direction other than (0, -1, 0) is rotated.
  *
- * @returns the file, in memory that the pool's tasks share
+ * @returns The file, in memory that the pool's tasks share.
  */
 export async function writeGlb({ cloud: given, degrees }: WrittenCloud, pool: TaskPool = inline): Promise<Uint8Array> {
   const cloud = upright(given);
@@ -48,7 +49,7 @@ export async function writeGlb({ cloud: given, degrees }: WrittenCloud, pool: Ta
   return bytes;
 }
 
-/** Numbers of the splats that keep a degree. */
+/** Indices of the splats that keep a degree. */
 function splatsOf(degrees: Uint8Array, degree: number): Uint32Array {
   const members = new Uint32Array(degrees.length);
   let count = 0;
@@ -61,12 +62,14 @@ function primitiveOf(columns: Columns, splats: Uint32Array, degree: number): Pri
   return [{ degree, splats, columns: glbColumns(columns, degree), bounds: placeBounds(columns, splats) }];
 }
 
-/** The file but for its numbers, how many bytes these take, and where among them the attributes of each primitive begin. */
+/**
+ * Returns the JSON of the file, the size of its binary data, and the offsets of the attributes of each primitive in it.
+ */
 function describe(
   primitives: readonly Primitive[],
   { origin, hints }: Pick<GaussianCloud, 'origin' | 'hints'>,
 ): { json: object; byteLength: number; starts: number[][] } {
-  // The extension has a value for the usual order alone.
+  // The extension has a value only for the usual order.
   const splats = hints?.order ? { ...SPLATS, extras: { sortingMethod: hints.order } } : SPLATS;
   const bufferViews: object[] = [];
   const accessors: object[] = [];
@@ -98,7 +101,7 @@ function describe(
     extensionsUsed: [EXTENSION],
     scene: 0,
     scenes: [{ nodes: [0] }],
-    // Far from (0, 0, 0) float32 would lose what lies close together.
+    // Far from (0, 0, 0) float32 would lose detail.
     nodes: [{ mesh: 0, ...(origin.some((x) => x !== 0) && { translation: placeOf(origin) }) }],
     meshes: [{ primitives: meshPrimitives }],
     accessors,
@@ -108,7 +111,7 @@ function describe(
   return { json, byteLength, starts };
 }
 
-/** A GLB whose binary chunk is still empty, and the byte where that begins. */
+/** A GLB with an empty binary chunk, and the offset of that chunk's data. */
 function containerOf(json: object, byteLength: number, pool: TaskPool): { bytes: Uint8Array; start: number } {
   const text = new TextEncoder().encode(JSON.stringify(json));
   const textLength = text.length + (-text.length & 3);

@@ -10,36 +10,39 @@ import { fractionalBitsOf, writeSpz } from './spz.js';
 import type { EncodeWebp } from './sog.js';
 import { isLodIndex } from './streamed-sog.js';
 
-/** What is written of a reduced cloud. */
+/** Input of writers from a reduced cloud. */
 export interface WrittenCloud extends Pick<ReducedCloud, 'cloud' | 'degrees'> {
-  /** [N] numbers of its splats in the source; default 0 to N - 1. */
+  /** [N] indices of its splats in the source; default 0 to N - 1. */
   readonly kept?: Uint32Array;
 }
 
-/** A way to write a scene: how precise, and how. */
+/** An encoding of a scene with a certain precision. */
 export interface Encoding {
   /** For readers. */
   readonly title: string;
-  /** @param pool does what can be done in parts; the file then lies in its memory */
+  /** @param pool Runs parallel parts; the file is then in its memory. */
   readonly write: (reduced: WrittenCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
-  /** True if every splat takes as many coefficients as the one with the most: fewer bands of some save nothing. */
+  /**
+   * Whether every splat takes as many coefficients as the one with the most, so that lower degrees of some save
+   * nothing.
+   */
   readonly hasOneDegree?: boolean;
-  /** The same encoding with all steps multiplied by a factor, if {@link tune} chose them. */
+  /** The same encoding with all steps multiplied by a factor, if {@link tune} selected them. */
   readonly coarser?: (factor: number) => Encoding;
   /**
-   * Chooses how precise it is: such that the rounding of a scene is at most this.
-   * @param measure says how much it is, a mean squared error
-   * @param seen how views see the splats of the scene, where that is known
+   * Selects the precision so that the rounding error of a scene is within a limit.
+   * @param measure Returns the mean squared error.
+   * @param seen Visibility of the splats of the scene, if known.
    */
   readonly tune?: (whole: WrittenCloud, measure: Measure, target: number, seen?: SeenSplats) => Promise<Encoding>;
 }
 
-/** Says how far a written file is from the scene: a mean squared error, peak 1. */
+/** Returns the mean squared error of a written file against the scene, peak 1. */
 export type Measure = (bytes: Uint8Array) => Promise<number>;
 
-/** What formats need that no package of ours has. */
+/** External encoders for formats. */
 export interface Encoders {
-  /** Of lossless WebP, for SOG. */
+  /** Lossless WebP, for SOG. */
   readonly encodeWebp?: EncodeWebp;
 }
 
@@ -48,7 +51,7 @@ const spz = (shBits: number): Encoding => ({
   write: ({ cloud }) => writeSpz(cloud, { shBits }),
 });
 
-/** Splats of planes stay in their order, which primitives for each degree would take apart. */
+/** Scenes of planes keep their order, which separate primitives for each degree would break. */
 const GLB_OF_PLANES: Encoding = {
   title: 'GLB, one primitive in the order of the scene',
   write: ({ cloud, degrees }, pool) =>
@@ -56,7 +59,7 @@ const GLB_OF_PLANES: Encoding = {
   hasOneDegree: true,
 };
 
-/** Ways to write each kind of file, the smallest first. */
+/** Encodings of each kind of file, smallest first. */
 const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
   ['.spz', [spz(4), spz(5), spz(6), spz(8)]],
   ['.glb', [{ title: 'GLB, a primitive for each degree', write: writeGlb }]],
@@ -64,11 +67,11 @@ const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
 ]);
 
 /**
- * The ways to write a file of this name; of `lod-meta.json`, an archive of a folder: see {@link filesOfZip}.
- * @param cloud what is to be written, as far as it is known
- * @param encoders what `.sog` is written with
- * @throws GaussianSplatError `argument/value` for a name with an unknown extension, for a scene trained with a filter that the format cannot name, and for one
- * that lies farther from (0, 0, 0) than the format has digits.
+ * Returns the encodings for a file of this name; for `lod-meta.json`, an archive of a folder: see {@link filesOfZip}.
+ * @param cloud The scene, if it is known already.
+ * @param encoders Encoders for `.sog`.
+ * @throws GaussianSplatError `argument/value` for a name with an unknown extension, for a scene trained with a filter
+ * that the format cannot declare, and for one farther from (0, 0, 0) than the format's range.
  */
 export function encodingsFor(
   name: string,
@@ -99,12 +102,12 @@ export function encodingsFor(
 
 type Filter = Partial<Pick<GaussianCloud, 'antialiased' | 'filterVariance'>>;
 
-/** Variance in px² that scenes have without another word. */
+/** Variance in px² of scenes without a declared filter. */
 const USUAL_VARIANCE = 0.3;
-/** Variance in px² of what SOG calls `model: antialiased`. */
+/** Variance in px² of SOG's `model: antialiased`. */
 const MIP_VARIANCE = 0.1;
 
-/** Filters that a format can name. */
+/** Filters that a format can declare. */
 const HOLDS_FILTER: Readonly<Record<string, (isCompensated: boolean, variance: number) => boolean>> = {
   '.ply': () => true,
   '.spz': (_, variance) => variance === USUAL_VARIANCE,
@@ -112,7 +115,7 @@ const HOLDS_FILTER: Readonly<Record<string, (isCompensated: boolean, variance: n
   '.sog': (isCompensated, variance) => variance === USUAL_VARIANCE || (isCompensated && variance === MIP_VARIANCE),
 };
 
-/** Throws `argument/value` if a scene would be read with another low-pass filter than it was trained with. */
+/** Throws `argument/value` if a scene would be read with a low-pass filter other than that of its training. */
 function requireFilter(
   name: string,
   extension: string,

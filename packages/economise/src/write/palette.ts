@@ -1,8 +1,8 @@
 import { RankedHeap } from '@gaussian-splat/renderer/tools';
 
-/** Groups of vectors that are alike, and which each belongs to. */
+/** Clusters of similar vectors, and the cluster of each. */
 export interface Palette {
-  /** [size, width] means of the groups. */
+  /** [size, width] means of the clusters. */
   readonly entries: Float32Array;
   readonly labels: Uint32Array;
   readonly size: number;
@@ -15,13 +15,14 @@ interface Group {
   readonly error: number;
 }
 
-/** Turns of the power iteration that finds along what a group is longest. */
+/** Iterations of the power method that finds the principal axis of a cluster. */
 const TURNS = 3;
 
 /**
- * Divides vectors into at most `size` groups: the one with the largest error is cut at its mean, across the direction in which it is longest, until there are enough.
+ * Divides vectors into at most `size` clusters: the one with the largest error is split at its mean, perpendicular to
+ * its principal axis, until there are enough.
  * @param vectors [N, width]
- * @param weights [N] how much an error of each counts
+ * @param weights [N] weight of an error of each.
  */
 export function findPalette(vectors: Float32Array, width: number, weights: Float32Array, size: number): Palette {
   const count = weights.length;
@@ -65,7 +66,7 @@ export function findPalette(vectors: Float32Array, width: number, weights: Float
   return { entries, labels, size: groups.length };
 }
 
-/** The two halves of a group; undefined where one would be empty. */
+/** The two halves of a cluster; undefined if one would be empty. */
 function cut(
   { members, mean }: Group,
   vectors: Float32Array,

@@ -1,6 +1,9 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 
-/** Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up and order; places in float64 where the cloud lies so far from (0, 0, 0) that float32 does not hold them. */
+/**
+ * Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals, with comments for filter, up and order;
+ * positions are float64 if the cloud lies too far from (0, 0, 0) for float32.
+ */
 export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
   const {
     count,
@@ -60,10 +63,10 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
   return bytes;
 }
 
-/** No extent has an infinite logarithm, at which other readers take offence; this is read as 0 in float32. */
+/** Replaces the infinite logarithm of a zero scale, which other readers reject; in float32 it is read as 0. */
 const LOG_NOTHING = -104;
 
-/** Opacity 1 has an infinite logit; 30 is as near as float32 comes. */
+/** Opacity 1 has an infinite logit; 30 is the nearest value in float32. */
 function logit(opacity: number): number {
   return Math.min(30, Math.max(-30, Math.log(opacity / (1 - opacity))));
 }

@@ -3,23 +3,28 @@ import { roundedBy, SeenRounder } from '../pages/round-harmonics.js';
 import { weighSplats, type SeenSplats } from '../pages/seen-splats.js';
 import type { Palette } from './palette.js';
 
-/** The code of 0 in the palette; codes nearer to it than {@link EVEN_CODES} are evenly spaced, and the largest is at most {@link MOST_BENT} steps. */
+/**
+ * The code of 0 in the palette; codes within {@link EVEN_CODES} of it are evenly spaced, and the largest is at most
+ * {@link MOST_BENT} steps.
+ */
 const [MIDDLE_CODE, EVEN_CODES, MOST_BENT] = [127, 48, 2000];
-/** The share of entries that weigh less than the one that has the usual step, and how many octaves larger a step is at most. */
+/**
+ * Rank of the weight, as a fraction of the entries, that gets the usual step, and the maximum octaves of larger steps.
+ */
 const [REFERENCE_RANK, MOST_OCTAVES] = [0.9, 5];
-/** Of the values of a codebook: more are more bytes, and finer than any step. */
+/** Digits of the values of a codebook: more take more bytes, and are finer than any step. */
 export const DIGITS = 6;
 
 export interface RoundedPalette {
   /** [size, width], {@link MIDDLE_CODE} for 0 */
   readonly codes: Uint8Array;
-  /** The entries have another order: those with equal steps are together, and in each such part as they are met first. */
+  /** The entries are reordered: by step, and within equal steps by first use. */
   readonly labels: Uint32Array;
   /** The codebook. */
   readonly values: readonly number[];
 }
 
-/** Rounds entries, each as coarsely as what shows it allows, to what is seen of the splat that shows it most. */
+/** Quantizes palette entries, each according to its visibility, optimized for the most visible splat that uses it. */
 export function roundPalette(
   { entries, labels, size }: Palette,
   told: { order: Uint32Array; weights: Float32Array; seen: SeenSplats | undefined; step: number },
@@ -41,7 +46,7 @@ export function roundPalette(
   const octaves = Uint8Array.from(sums, (sum) =>
     Math.min(MOST_OCTAVES, Math.max(0, Math.round(Math.log2(reference / Math.max(1e-36, sum)) / 2))),
   );
-  // Neighbours in the image with equal steps share codes.
+  // Neighbors in the image with equal steps have common codes.
   const numbers = new Uint32Array(size);
   met.sort((a, b) => octaves[a] - octaves[b]).forEach((entry, number) => (numbers[entry] = number));
   const scale = new CodeScale(
@@ -69,7 +74,10 @@ export function roundPalette(
   return { codes, labels: labels.map((label) => numbers[label]), values };
 }
 
-/** Values of codes -127 to 127: multiples of a step, and where these do not reach far enough, farther apart the farther from 0. */
+/**
+ * Values of codes -127 to 127: multiples of a step near 0, and if their range is too small, with increasing distances
+ * farther away.
+ */
 class CodeScale {
   readonly #step: number;
   readonly #bend: number;
@@ -84,7 +92,7 @@ class CodeScale {
     return Math.sign(code) * this.#step * (size + this.#bend * Math.max(0, size - EVEN_CODES) ** 2);
   }
 
-  /** @param unit codes are multiples of it */
+  /** @param unit Codes are multiples of it. */
   codeOf(value: number, unit: number, weight: number): number {
     const steps = value / this.#step - EVEN_CODES;
     const bent = this.#bend > 0 && steps > 0 ? (Math.sqrt(1 + 4 * this.#bend * steps) - 1) / (2 * this.#bend) : steps;
@@ -93,7 +101,7 @@ class CodeScale {
   }
 }
 
-/** What an error of each splat shows. */
+/** Weight of an error of each splat. */
 export function weightsOf(
   { opacities, scales }: GaussianCloud,
   order: Uint32Array,
@@ -101,7 +109,7 @@ export function weightsOf(
 ): Float32Array {
   const usual = Float32Array.from(order, (i) => {
     const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
-    // Opacity squared, times the area.
+    // Squared opacity times the area.
     return opacities[i] ** 2 * (Math.max(a * b, b * c, a * c) + 1e-20);
   });
   return seen
@@ -113,8 +121,9 @@ export function weightsOf(
 }
 
 /**
- * Constant coefficients of the colours that views see of some harmonics, in the mean: with M the mean of Y Yᵀ, the sum of M_j0 / M_00 times coefficient j; a root of M has the same quotients in its first column.
- * @param of coefficient and channel `n` of the splat at place k of the order
+ * Mean constant coefficients of the visible colors of some harmonics: with M the mean of Y Yᵀ, the sum of M_j0 / M_00
+ * times coefficient j; a root of M has the same quotients in its first column.
+ * @param of Returns coefficient and channel `n` of the splat at position k of the order.
  */
 export function addedBy(
   of: (k: number, n: number) => number,

@@ -8,9 +8,9 @@ import { addedBy, DIGITS, roundPalette, weightsOf } from './sog-palette.js';
 import { writeZip } from './zip.js';
 
 /**
- * Encodes an image as lossless WebP, pixels of alpha 0 with their colours.
+ * Encodes an image as lossless WebP, keeping the colors of transparent pixels.
  * @param rgba [height, width, 4]
- * @param effort 0 to 1: how much time there is to make it small
+ * @param effort 0 to 1: time to spend on a smaller file.
  */
 export type EncodeWebp = (
   rgba: Uint8ClampedArray,
@@ -20,8 +20,9 @@ export type EncodeWebp = (
 ) => Promise<Uint8Array>;
 
 /**
- * Steps of what is rounded: SOG has bytes for all of it, and images of fewer values are smaller. `place` in 1/65,535 of the scene's logarithmic box, `size` in octaves, `turn` and `opacity` in 1/255,
- * `color` and `harmonics` in units of coefficients, the latter for splats that show much: in others it is larger.
+ * Quantization steps: SOG stores bytes, and images with fewer values are smaller. `place` in 1/65,535 of the scene's
+ * logarithmic box, `size` in octaves, `turn` and `opacity` in 1/255, `color` and `harmonics` in units of coefficients,
+ * the latter for the most visible splats: for others it is larger.
  */
 export type SogSteps = Steps<'place' | 'size' | 'turn' | 'opacity' | 'color' | 'harmonics'>;
 
@@ -30,23 +31,26 @@ export interface SogOptions {
   /** Entries of the palette of harmonics, at most 65,536. */
   readonly palette: number;
   readonly encodeWebp: EncodeWebp;
-  /** Palettes that were found for the same cloud and order, by their sizes: those of other steps are the same. */
+  /** Cached palettes for the same cloud and order, by size: they do not depend on the steps. */
   readonly palettes?: Map<number, Palette>;
-  /** How the splats of the cloud are seen: what shows little of their harmonics has a less fitting entry of the palette. Default: as opacities and sizes tell. */
+  /**
+   * Visibility of the cloud's splats: harmonics of less visible ones get a less accurate palette entry. Default:
+   * estimated from opacities and sizes.
+   */
   readonly seen?: SeenSplats | undefined;
-  /** See {@link EncodeWebp}; default 0.7: with 1 it takes twenty times as long, for 1 % less. */
+  /** See {@link EncodeWebp}; default 0.7: 1 takes twenty times as long, for 1 % less. */
   readonly effort?: number;
 }
 
 const USUAL_EFFORT = 0.7;
-/** As fine as SOG has it. */
+/** Resolution of SOG. */
 const MOST_PLACES = 65_535;
 const PALETTE_ROW = 64;
-/** Codes of a codebook; where steps leave more, larger ones are taken. */
+/** Codes of a codebook; smaller steps are enlarged to fit. */
 const MOST_CODES = 255;
 const LN2 = Math.LN2;
 
-/** Writes SOG version 2 as a bundle. A scene with another up than (0, -1, 0) is turned. */
+/** Writes SOG version 2 as a bundle. A scene with an up direction other than (0, -1, 0) is rotated. */
 export async function writeSog(given: GaussianCloud, options: SogOptions): Promise<Uint8Array<ArrayBuffer>> {
   const cloud = upright(given);
   const order = packedOrder(cloud);
@@ -55,8 +59,8 @@ export async function writeSog(given: GaussianCloud, options: SogOptions): Promi
 }
 
 /**
- * The files of a SOG, by their names.
- * @param order indices of the splats that it holds, one or more, as they follow one another in it
+ * The files of a SOG by name.
+ * @param order Indices of its splats, at least one, in the order of the file.
  */
 export async function sogFiles(
   cloud: GaussianCloud,
@@ -137,7 +141,7 @@ function putMeans(
 ): { mins: number[]; maxs: number[] } {
   const codes = new Uint16Array(3 * order.length);
   const [mins, maxs]: [number[], number[]] = [[], []];
-  // Whole numbers of codes, so that the lower bytes of places have few values.
+  // Whole steps of codes, so that the lower bytes of positions have few values.
   const whole = Math.max(1, Math.round(step));
   for (let axis = 0; axis < 3; axis++) {
     const values = Float64Array.from(order, (i) => logPlace(positions[3 * i + axis] + origin[axis]));
@@ -156,7 +160,7 @@ function putMeans(
   return { mins, maxs };
 }
 
-/** The three components besides the largest, which alpha names. */
+/** The three components besides the largest, which alpha selects. */
 function quatsOf({ rotations }: GaussianCloud, order: Uint32Array, step: number): Image {
   const codes = new Uint8Array(4 * order.length);
   order.forEach((i, k) => {
@@ -165,7 +169,7 @@ function quatsOf({ rotations }: GaussianCloud, order: Uint32Array, step: number)
     for (let n = 1; n < 4; n++) if (Math.abs(q[n]) > Math.abs(q[largest])) largest = n;
     const sign = q[largest] < 0 ? -1 : 1;
     let at = 4 * k;
-    // About the middle, so that what is not turned stays so.
+    // Rounded about the center, so that an unrotated axis stays unrotated.
     for (let n = 0; n < 4; n++) {
       if (n !== largest) codes[at++] = 128 + signedByte(sign * q[n] * Math.SQRT2 * 127.5 - 0.5, step);
     }
@@ -177,7 +181,7 @@ function quatsOf({ rotations }: GaussianCloud, order: Uint32Array, step: number)
 const signedByte = (value: number, step: number): number =>
   Math.min(127, Math.max(-128, Math.round(Math.round(value / step) * step)));
 
-/** Evenly spaced values, and the nearest of them of each number. */
+/** Evenly spaced values, and the nearest one for each number. */
 function codebook(
   length: number,
   width: number,
@@ -205,7 +209,10 @@ function codebook(
   return { values, codes };
 }
 
-/** The palette of harmonics, as images and in `meta.json`, and what it adds to the colours that views see of each splat: its constant coefficient makes up for that. */
+/**
+ * The palette of harmonics, as images and in `meta.json`, and its effect on the visible colors of each splat, which the
+ * constant coefficient compensates.
+ */
 interface Harmonics {
   readonly meta: { readonly count: number; readonly bands: number; readonly codebook: readonly number[] };
   readonly images: ReadonlyMap<string, Image>;

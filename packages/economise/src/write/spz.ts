@@ -1,7 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
 
-/** How precisely an SPZ is written. */
+/** Precision of an SPZ. */
 export interface SpzOptions {
   /** Bits of each coefficient above the constant one, 2 to 8; fewer compress better. */
   readonly shBits: number;
@@ -9,20 +9,23 @@ export interface SpzOptions {
 
 const COLOUR_SCALE = 0.15;
 const MAX_FRACTIONAL_BITS = 20;
-/** The largest coordinate of 24 bits, in steps. */
+/** The largest 24-bit coordinate, in steps. */
 const MOST_STEPS = 2 ** 23 - 1;
 
-/** The frame of the numbers, a cloud's own, which current converters keep and expect: right, down, forward is system 6 of the extension 0xADBE0003. */
+/**
+ * The coordinate system of a cloud, which current converters keep and expect: right, down, forward is system 6 of the
+ * extension 0xADBE0003.
+ */
 const FRAME = [0xadbe0003, 4, 6];
-/** Our own record, docs/decisions/0022-the-frame-of-spz.md: 1 for splats ordered at each pixel. */
+/** Our own record, docs/decisions/0022-the-frame-of-spz.md: 1 for per-pixel order. */
 const PIXEL_ORDER = [0x47530001, 4, 1];
 const FLAG_ANTIALIASED = 1;
 const FLAG_EXTENSIONS = 2;
 
 /**
- * Writes SPZ version 3 (Niantic) in the frame of PLY, which it names, with as many bits after the point of the coordinates as 24 bits allow.
- * A scene with another up than (0, -1, 0) is turned.
- * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607
+ * Writes SPZ version 3 (Niantic) in the coordinates of PLY, which it declares, with the maximum number of fractional
+ * bits for 24-bit coordinates. A scene with an up direction other than (0, -1, 0) is rotated.
+ * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607.
  */
 export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
   const cloud = upright(given);
@@ -48,8 +51,8 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
 const byte = (value: number): number => Math.min(255, Math.max(0, Math.round(value)));
 
 /**
- * Bits after the point that leave room for the farthest coordinate.
- * @throws GaussianSplatError `argument/value` where there is none without any.
+ * Number of fractional bits for the farthest coordinate.
+ * @throws GaussianSplatError `argument/value` if it does not fit even without any.
  */
 export function fractionalBitsOf({ positions, origin }: Pick<GaussianCloud, 'positions' | 'origin'>): number {
   let largest = 1e-9;

@@ -8,20 +8,23 @@ import { nothingToWrite, sogFiles, type SogOptions } from './sog.js';
 const LOD_INDEX = 'lod-meta.json';
 /** Whether a file of this name is the index of a streamed scene. */
 export const isLodIndex = (name: string): boolean => /(^|[\\/])lod-meta\.json$/i.test(name);
-/** Splats of the coarsest level of a box: one chunk of the renderer, of which each coarser level has a quarter. */
+/** Splats of the coarsest level of a box: one chunk of the renderer, and the ratio between two levels. */
 const CHUNK = 256;
 const KEPT = 4;
-/** Levels that a scene has at least where it has the splats, and splats of all coarsest levels together at most: more would delay the first frame. */
+/**
+ * Minimum number of levels of a scene with enough splats, and the maximum number of splats over all coarsest levels:
+ * more would delay the first frame.
+ */
 const LEAST_LEVELS = 4;
 const MOST_COARSEST = 40_000;
-/** Splats of a file at most: it has to come whole before any of it is shown. */
+/** Maximum number of splats in a file, which has to be complete before any of it is shown. */
 const FILE_SPLATS = 131_072;
 
-/** A part of the scene: neighbours, and what stands for them from afar. */
+/** A region of the scene: neighboring splats, and their coarser levels. */
 interface Box {
   /** Indices in the cloud. */
   readonly kept: Uint32Array;
-  /** The finest first. */
+  /** Finest level first. */
   readonly levels: readonly SplatLevel[];
 }
 
@@ -32,10 +35,10 @@ interface Run {
 }
 
 /**
- * Writes streamed SOG: an index, `lod-meta.json`, and SOG files of some boxes at one level of detail each. Each level has a quarter of the splats of the one before.
- * A scene with another up than (0, -1, 0) is turned.
- * @returns files by their paths; the index is the last
- * @throws GaussianSplatError `argument/cloud` for a scene without a splat that can be drawn
+ * Writes streamed SOG: an index, `lod-meta.json`, and SOG files of some boxes at one level of detail each. Each level
+ * has a quarter of the splats of the previous one. A scene with an up direction other than (0, -1, 0) is rotated.
+ * @returns Files by path; the index is last.
+ * @throws GaussianSplatError `argument/cloud` for a scene without usable splats.
  */
 export async function writeStreamedSog(
   given: GaussianCloud,
@@ -78,7 +81,7 @@ export async function writeStreamedSog(
   return files.set(LOD_INDEX, new TextEncoder().encode(JSON.stringify(index)));
 }
 
-/** Boxes of as many splats each, give or take one, so that all have the same levels. */
+/** Boxes with equally many splats, within one, so that all have the same levels. */
 function boxesOf(cloud: GaussianCloud, order: Uint32Array): Box[] {
   let most = CHUNK * KEPT ** (LEAST_LEVELS - 1);
   while ((order.length * CHUNK) / most > MOST_COARSEST) most *= KEPT;
@@ -90,7 +93,7 @@ function boxesOf(cloud: GaussianCloud, order: Uint32Array): Box[] {
   });
 }
 
-/** Boxes whose splats of a level lie in one file. */
+/** Groups of boxes whose splats of a level are in one file. */
 function groupsOf(boxes: readonly Box[], level: number): number[][] {
   const groups: number[][] = [];
   let splats = Infinity;
@@ -117,7 +120,7 @@ function joined(parts: readonly Uint32Array[]): Uint32Array {
   return all;
 }
 
-/** Levels one after the other as a cloud; opacities above 1, which merged splats have, are 1. */
+/** Concatenates levels to a cloud; opacities of merged splats above 1 become 1. */
 function cloudOf(levels: readonly SplatLevel[], like: GaussianCloud): GaussianCloud {
   const count = levels.reduce((sum, level) => sum + level.count, 0);
   const [positions, scales] = [new Float32Array(3 * count), new Float32Array(3 * count)];
@@ -138,17 +141,17 @@ function cloudOf(levels: readonly SplatLevel[], like: GaussianCloud): GaussianCl
   return { ...like, count, positions, scales, rotations, opacities, sh };
 }
 
-/** A float32 has a square of it. */
+/** A float32 can hold its square root. */
 const LEAST_VARIANCE = 1e-36;
 
-/** @param factors lower triangular roots: xx, yx, yy, zx, zy, zz */
+/** @param factors Lower triangular roots: xx, yx, yy, zx, zy, zz. */
 function covarianceOf(factors: Float32Array, at: number): number[] {
   const [xx, yx, yy, zx, zy, zz] = factors.subarray(at, at + 6);
   const [xy, xz, yz] = [xx * yx, xx * zx, yx * zx + yy * zy];
   return [xx * xx, xy, xz, xy, yx * yx + yy * yy, yz, xz, yz, zx * zx + zy * zy + zz * zz];
 }
 
-/** The box of the centres, world units. */
+/** The box of the centers, world units. */
 function boundOf({ positions, origin }: GaussianCloud, kept: Uint32Array): { min: number[]; max: number[] } {
   const [min, max] = [
     [Infinity, Infinity, Infinity],

@@ -8,22 +8,23 @@ import { writeStreamedSog } from './streamed-sog.js';
 import { writeZip } from './zip.js';
 
 const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32, harmonics: 1 / 64 };
-/** Numbers of a splat that each is the step of; of an entry of the palette about half is 0. */
+/** Numbers of a splat for each step; about half of a palette entry is 0. */
 const NUMBERS: Omit<SogSteps, 'harmonics'> = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
-/** As fine as files can have them. */
+/** Finest steps that files support. */
 const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3, harmonics: 1e-3 };
 const PALETTES = [1024, 4096, 8192, 16_384, 32_768, 65_536];
-/** Share of the error that goes to the palette at most, if a larger one makes less. */
+/** Maximum fraction of the error for the palette, if a larger one would have less. */
 const PALETTE_SHARE = 0.4;
-/** How near to what is allowed a search ends. */
+/** A search ends at this fraction of the allowed error. */
 const NEAR_ENOUGH = 0.9;
-/** For files that are measured and thrown away. */
+/** For temporary files of measurements. */
 const QUICK = 0;
 
 /**
- * SOG whose steps, and whose palette, are as coarse as measurements allow.
- * @param encodeWebp undefined where only names are looked at
- * @param isStreamed whether it is written as an archive of an index and files by level of detail; the steps are found on one file all the same
+ * Returns a SOG encoding whose steps and palette are as coarse as measurements allow.
+ * @param encodeWebp Undefined if only names are needed.
+ * @param isStreamed Whether to write an archive of an index and files by level of detail; the steps are still measured
+ * on one file.
  */
 export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false): Encoding {
   return {
@@ -86,7 +87,7 @@ async function tuned(
   return { steps, palette, encodeWebp, seen };
 }
 
-/** How some of the splats are seen. */
+/** Visibility of some of the splats. */
 function splatsSeen({ energies, roots }: SeenSplats, kept: Uint32Array): SeenSplats {
   const numbers = roots.length / energies.length;
   const own = new Float32Array(numbers * kept.length);

@@ -1,8 +1,8 @@
-/** A ZIP archive of files that are not compressed: they are already. */
+/** Writes ZIP archives without compression, because the files are already compressed. */
 const LOCAL = 0x04034b50;
 const CENTRAL = 0x02014b50;
 const END = 0x06054b50;
-/** Version 2.0, and 1980-01-01: archives of the same files are the same bytes. */
+/** Version 2.0, and 1980-01-01, so that archives of the same files are identical. */
 const VERSION = 20;
 const DATE = 0x21;
 
@@ -18,7 +18,7 @@ function crc32(bytes: Uint8Array): number {
   return ~code >>> 0;
 }
 
-/** @param files by their names */
+/** @param files Files by name. */
 export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<ArrayBuffer> {
   const entries = [...files].map(([name, bytes]) => ({ name: new TextEncoder().encode(name), bytes }));
   const total = entries.reduce((sum, { name, bytes }) => sum + 30 + 46 + 2 * name.length + bytes.length, 22);
@@ -70,7 +70,7 @@ export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<Arr
   return zip;
 }
 
-/** Flags (names are UTF-8), method, time, date, checksum, sizes, lengths of the name and of what else there is. */
+/** Flags (names are UTF-8), method, time, date, checksum, sizes, lengths of the name and of the extra field. */
 function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number])[] {
   return [
     [2, 0x800],
@@ -85,7 +85,7 @@ function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number]
   ];
 }
 
-/** The files of an archive that {@link writeZip} made, by their names. */
+/** Reads the files of an archive that {@link writeZip} wrote, by name. */
 export function filesOfZip(zip: Uint8Array): Map<string, Uint8Array> {
   const view = new DataView(zip.buffer, zip.byteOffset, zip.byteLength);
   const files = new Map<string, Uint8Array>();

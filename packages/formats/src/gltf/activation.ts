@@ -1,25 +1,29 @@
-/** Splats whose accessors hold logarithms, logits or another frame than the extension asks for: tools wrote such files while it was a draft, and some still do. */
+/**
+ * Splats whose accessors hold logarithms, logits or other coordinates than the extension specifies: tools wrote such
+ * files while it was a draft, and some still do.
+ */
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { expInPlace, sigmoidInPlace, type DraftCloud } from '../cloud.js';
 import { warn } from '../faults.js';
 import { isObject } from '../json.js';
 import type { Json } from './container.js';
 
-/** How the numbers of all uncompressed splats of a document are meant. */
+/** Encoding of all uncompressed splats of a document. */
 export interface Activation {
   readonly hasLogarithms: boolean;
   readonly hasLogits: boolean;
-  /** Positions and rotations are in the frame of PLY. */
+  /** Whether positions and rotations are in the coordinates of PLY. */
   readonly isInPlyFrame: boolean;
 }
 
-/** Opacities beyond 0..1 by less are rounding. */
+/** Tolerance of opacities outside 0..1. */
 const ROUNDING = 1e-3;
 
 /**
- * The extension forbids scales below 0 and opacities outside of 0..1: one of them proves that all are logarithms or logits. splat-transform wrote logarithms before June 2026, up to
- * version 2.3 whatever their sign, and version 1 wrote the frame of PLY, as gsbox does.
- * @param clouds uncompressed splats as the accessors have them
+ * Infers the encoding. The extension forbids scales below 0 and opacities outside 0..1, so a single one proves
+ * logarithms or logits. splat-transform wrote logarithms before June 2026, up to version 2.3 with any sign, and version
+ * 1 wrote the coordinates of PLY, as gsbox does.
+ * @param clouds Uncompressed splats with the values of the accessors.
  */
 export function activationOf(json: Json, clouds: readonly Pick<GaussianCloud, 'scales' | 'opacities'>[]): Activation {
   const { asset } = json;
@@ -34,10 +38,10 @@ export function activationOf(json: Json, clouds: readonly Pick<GaussianCloud, 's
   };
 }
 
-/** Whether nothing of it needs a change. */
+/** Whether the encoding matches the specification. */
 export const isPlain = ({ hasLogarithms, hasLogits }: Activation): boolean => !hasLogarithms && !hasLogits;
 
-/** Makes scales and opacities of what the accessors hold, in place. */
+/** Converts the values of the accessors to scales and opacities, in place. */
 export function activate(cloud: DraftCloud, { hasLogarithms, hasLogits }: Activation): void {
   if (hasLogarithms) expInPlace(cloud.scales);
   if (hasLogits) sigmoidInPlace(cloud.opacities);

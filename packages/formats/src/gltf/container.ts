@@ -5,7 +5,7 @@ import { parseJson, show, type JsonSource } from '../json.js';
 
 export type Json = Record<string, unknown>;
 
-/** A glTF file taken apart. */
+/** The parts of a glTF file. */
 export interface GltfFile {
   readonly json: Json;
   /** The binary chunk of a GLB: the first buffer. */
@@ -13,20 +13,21 @@ export interface GltfFile {
 }
 
 const MAX_JSON_BYTES = 1 << 26;
-/** Buffers may be written into the JSON itself; no browser has much longer strings. */
+/** Buffers may be embedded in the JSON; browsers do not support much longer strings. */
 const MAX_TEXT_BYTES = 500_000_000;
 const HEADER_BYTES = 12;
 
 /**
- * What a file may require without touching splats: materials, textures, lights, metadata and the like, and compression that only meshes have. Integers in attributes
- * (`KHR_mesh_quantization`) are read.
+ * Extensions that a file may require without affecting splats: materials, textures, lights, metadata and similar, and
+ * compression of meshes. Integer attributes (`KHR_mesh_quantization`) are supported.
  */
 const HARMLESS =
   /^(KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))|^KHR_gaussian_splatting(_compression_spz(_2)?)?$/;
 
 /**
- * Takes a GLB, or a glTF in JSON, apart. Throws `decode/unsupported` where it requires what is not known here, as glTF asks of readers.
- * @param known extensions that a file may require
+ * Parses the container of a GLB or of a glTF in JSON. Throws `decode/unsupported` if it requires unknown extensions, as
+ * the specification demands.
+ * @param known Extensions that a file may require.
  */
 export function openContainer(source: JsonSource, known = HARMLESS): GltfFile {
   const { bytes, name } = source;
@@ -55,7 +56,7 @@ export function openContainer(source: JsonSource, known = HARMLESS): GltfFile {
 
 const CONVERT =
   'convert the scene to SPZ or PLY with a tool that knows the extension, or export it with KHR_gaussian_splatting alone';
-/** What to do about extensions that are in use. */
+/** Remedies for common unsupported extensions. */
 const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
   [
     /meshopt/i,
@@ -68,7 +69,7 @@ const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
   [/spz/i, 'export the scene again with KHR_gaussian_splatting_compression_spz_2, or give the SPZ that it was made of'],
 ];
 
-/** Extensions that a file uses, and that are not known here: what they add is not drawn. */
+/** Returns the extensions that a file uses without support here: their content is not drawn. */
 export function unknownExtensions({ extensionsUsed }: Json): string[] {
   const used: unknown[] = Array.isArray(extensionsUsed) ? extensionsUsed : [];
   return [...new Set(used.map(String))].filter((extension) => !HARMLESS.test(extension));
@@ -104,7 +105,7 @@ function openGlb({ bytes, name, budget }: JsonSource): GltfFile {
   if (asciiOf(bytes, 16, 20) !== 'JSON') throw damaged(where(16), 'a chunk of JSON', 'another', 'decode/header');
   need(jsonEnd);
   let textEnd = jsonEnd;
-  // Some writers pad with zeros in place of spaces.
+  // Some writers pad with zeros instead of spaces.
   while (bytes[textEnd - 1] === 0) textEnd--;
   const text = bytes.subarray(HEADER_BYTES + 8, textEnd);
   const json = parseJson({ bytes: text, name: `${name}, JSON of the GLB`, budget }, MAX_JSON_BYTES);

@@ -7,14 +7,14 @@ import type { OpenPart, SceneSource, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
 
-/** A type of numbers: bytes of one, the largest, and how to read it. */
+/** A component type: its size in bytes, its maximum, and its getter. */
 interface Component {
   readonly bytes: number;
   readonly max: number;
   readonly get: (view: DataView, at: number) => number;
 }
 
-/** Reads components of the types that glTF has. */
+/** Component types of glTF. */
 export const COMPONENTS: ReadonlyMap<unknown, Component> = new Map([
   [5120, { bytes: 1, max: 127, get: (view: DataView, at: number) => view.getInt8(at) }],
   [5121, { bytes: 1, max: 255, get: (view: DataView, at: number) => view.getUint8(at) }],
@@ -33,18 +33,18 @@ const WIDTHS: ReadonlyMap<unknown, number> = new Map([
 
 /** Numbers of an accessor. */
 export interface AccessorData {
-  /** Elements of the accessor, those too that were not asked for. */
+  /** Total number of elements of the accessor, including those outside the range. */
   readonly count: number;
   /** Numbers of one element. */
   readonly width: number;
-  /** [elements asked for, width], normalised where the accessor says so. Not to be changed: it may be the file's own memory. */
+  /** [requested elements, width], normalized if the accessor requires it. Read-only: it may be the file's own memory. */
   readonly values: Float32Array;
 }
 
-/** Fetches a file by the address that a glTF has for it, relative or absolute. */
+/** Fetches a file by its URI in a glTF, relative or absolute. */
 export type OpenUri = (uri: string) => Promise<Uint8Array>;
 
-/** Access to the parts of a glTF file by number, every one checked before it is used. */
+/** Validated access to the parts of a glTF file by index. */
 export class GltfDocument {
   readonly json: Json;
   readonly name: string;
@@ -53,10 +53,10 @@ export class GltfDocument {
   readonly #open: OpenPart | undefined;
   readonly #openUri: OpenUri | undefined;
   readonly #buffers = new Map<number, Promise<Uint8Array>>();
-  /** Each is fetched once, however many buffers name it. */
+  /** Each file is fetched once, even if several buffers name it. */
   readonly #files = new Map<string, Promise<Uint8Array>>();
 
-  /** @param open opens files beside it by their paths, or any file by its address */
+  /** @param open Opens files relative to it by their paths, or any file by its address. */
   constructor(
     { json, binary }: GltfFile,
     { name, budget }: Pick<SceneSource, 'name' | 'budget'>,
@@ -75,19 +75,19 @@ export class GltfDocument {
     throw damaged(`${this.name}, ${path}`, expected, show(found), 'decode/header');
   }
 
-  /** Charges what is about to be allocated. Throws `out-of-memory/budget`. */
+  /** Charges bytes before they are allocated. Throws `out-of-memory/budget`. */
   take(bytes: number): void {
     this.budget.take(bytes, this.name);
   }
 
-  /** Element `index` of an array of objects at the top of the file. */
+  /** Element `index` of an array of objects at the top level of the file. */
   item(list: string, index: unknown): Json {
     const array = this.json[list];
     const found: unknown = Array.isArray(array) && this.isIndex(index) ? array[index] : undefined;
     return isObject(found) ? found : this.fail(`${list}[${String(index)}]`, 'an object', found);
   }
 
-  /** True if a buffer is another file. */
+  /** Whether a buffer is another file. */
   get hasFilesBeside(): boolean {
     const { buffers } = this.json;
     return Array.isArray(buffers) && buffers.some((buffer: unknown) => isObject(buffer) && isFile(buffer.uri));
@@ -97,15 +97,15 @@ export class GltfDocument {
     return Number.isSafeInteger(value) && (value as number) >= 0;
   }
 
-  /** Number of elements that an accessor announces; what it takes in bytes is checked when it is read. */
+  /** Declared number of elements of an accessor; its size in bytes is checked when it is read. */
   accessorCount(index: unknown): number {
     const { count } = this.item('accessors', index);
     return this.isIndex(count) ? count : this.fail(`accessors[${String(index)}].count`, 'a whole number', count);
   }
 
   /**
-   * @param range elements that are read; default all
-   * @param mostZeros elements that a sparse accessor may have that no buffer holds: they are zeros
+   * @param range Elements to read; default all.
+   * @param mostZeros Maximum number of elements of a sparse accessor without a buffer: they are zeros.
    */
   async readAccessor(index: unknown, range?: SplatRange, mostZeros = 0): Promise<AccessorData> {
     const accessor = this.item('accessors', index);
@@ -131,12 +131,12 @@ export class GltfDocument {
       const { putSparse } = await loadModule('the code that reads sparse accessors', () => import('./sparse.js'));
       await putSparse(this, sparse, { path, componentType, count, range: own, width, values: whole });
     }
-    // The lowest signed integer stands for -1 as well as the one above it.
+    // The lowest signed integer means -1, as does the one above it.
     if (normalized === true && componentType !== FLOAT) normalise(whole, component.max);
     return { count, width, values: whole };
   }
 
-  /** Where it has no view and is not sparse either, numbers come by some extension. */
+  /** Without a view and without sparse data, an extension must provide the numbers. */
   #zeros(path: string, length: number | undefined): Float32Array {
     if (length !== undefined) {
       this.take(4 * length);
@@ -146,7 +146,7 @@ export class GltfDocument {
     throw damaged(`${this.name}, ${path}`, expected, 'one without "bufferView"', 'decode/unsupported');
   }
 
-  /** Numbers as they are stored. */
+  /** Reads numbers as stored. */
   async #readDense(
     accessor: Json,
     path: string,
@@ -171,7 +171,7 @@ export class GltfDocument {
     this.take(4 * elements * width);
     const start = byteOffset + first * byteStride;
     if (accessor.componentType === FLOAT && byteStride === 4 * width && hostIsLittleEndian) {
-      // Numbers that lie as they are wanted are the file's own. A view's beginning need not be a multiple of 4.
+      // Numbers in the required layout share the file's memory. The start of a view need not be a multiple of 4.
       const own = alignedTo4(bytes.subarray(start, start + 4 * elements * width));
       return new Float32Array(own.buffer, own.byteOffset, elements * width);
     }
@@ -189,7 +189,7 @@ export class GltfDocument {
     return this.readRange(this.item('bufferViews', index), `bufferViews[${String(index)}]`);
   }
 
-  /** The bytes of a part of a buffer. */
+  /** The bytes of a range of a buffer. */
   async readRange({ buffer, byteOffset = 0, byteLength }: Json, path: string): Promise<Uint8Array> {
     if (!this.isIndex(buffer) || !this.isIndex(byteOffset) || !this.isIndex(byteLength)) {
       return this.fail(path, 'a buffer, an offset and a length', { buffer, byteOffset, byteLength });
@@ -217,7 +217,7 @@ export class GltfDocument {
     return this.readUri(uri, `buffers[${index}].uri`);
   }
 
-  /** The bytes at an address that the file has; each address is fetched once. */
+  /** The bytes at a URI of the file; each URI is fetched once. */
   async readUri(uri: unknown, path: string): Promise<Uint8Array> {
     if (typeof uri !== 'string') return this.fail(path, 'an address', uri);
     if (/^data:/i.test(uri)) return this.#decodeDataUri(uri, path);
@@ -225,7 +225,7 @@ export class GltfDocument {
       const expected = 'a relative address: a file beside the scene, or "data:"';
       throw damaged(`${this.name}, ${path}`, expected, show(uri), 'decode/unsupported');
     }
-    // What follows the path is for servers; the file that lies beside the scene is found without.
+    // A query after the path is for servers; a local file is found without it.
     const [, file, query] = /^([^?#]*)(\?[^#]*)?/.exec(uri)!;
     const found = this.#files.get(uri) ?? this.#openUri?.(uri) ?? this.#open!(decodeSafely(file), query);
     this.#files.set(uri, found);
@@ -243,7 +243,7 @@ export class GltfDocument {
   }
 }
 
-/** Characters as bytes: by their numbers in a loop, 25 times as fast as `Uint8Array.from` with a function. */
+/** Converts characters to bytes in a loop, which is 25 times as fast as `Uint8Array.from` with a function. */
 function bytesOf(text: string): Uint8Array {
   const bytes = new Uint8Array(text.length);
   for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);

@@ -5,7 +5,7 @@ import { isObject } from '../json.js';
 /** 3 x 4 affine map, row by row: [a b c tx, d e f ty, g h i tz]. */
 export type Affine = readonly number[];
 
-/** A mesh at its place in the scene. */
+/** An instance of a mesh in the scene. */
 export interface PlacedMesh {
   readonly mesh: number;
   readonly toScene: Affine;
@@ -13,11 +13,14 @@ export interface PlacedMesh {
 
 const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 
-/** A scene may show the same mesh many times; more than this is no scene of splats. */
+/** A scene may contain the same mesh many times; more than this is implausible for splats. */
 const MAX_PLACES = 10_000;
 const MAX_DEPTH = 1_000;
 
-/** The meshes of the default scene (of all nodes where there is none), each with the product of its nodes' transforms. */
+/**
+ * Returns the meshes of the default scene (of all nodes if there is none), each with the product of its nodes'
+ * transforms.
+ */
 export function placedMeshes(document: GltfDocument): PlacedMesh[] {
   const placed: PlacedMesh[] = [];
   walkNodes(document, (json, toScene) => {
@@ -27,11 +30,12 @@ export function placedMeshes(document: GltfDocument): PlacedMesh[] {
 }
 
 /**
- * Visits each node of the default scene (of all nodes if there is none), as often as the scene shows it. Throws `decode/header` if that is more than 10,000 times, or deeper than 1,000.
- * @param visit called with the node, the product of its and its parents' transforms, and its number
+ * Visits each node of the default scene (of all nodes if there is none), once for each instance. Throws `decode/header`
+ * for more than 10,000 visits, or a depth above 1,000.
+ * @param visit Called with the node, the product of its and its parents' transforms, and its index.
  */
 export function walkNodes(document: GltfDocument, visit: (node: Json, toScene: Affine, index: number) => void): void {
-  // Lists of nodes, and how far each has been followed: nodes may name the same long list again and again.
+  // Stack of node lists with positions, because many nodes may refer to the same long list.
   const open = [{ nodes: rootNodes(document), next: 0, parent: IDENTITY }];
   for (let visited = 0; open.length > 0;) {
     const list = open[open.length - 1];

@@ -10,18 +10,18 @@ import type { SceneSource, SplatRange } from '../scene-format.js';
 import type { GltfDocument } from './document.js';
 
 const EXTENSION = 'KHR_gaussian_splatting';
-/** Its name while it was a draft, and the later one. */
+/** Its name as a draft, and the later one. */
 const SPZ_EXTENSIONS = [`${EXTENSION}_compression_spz_2`, `${EXTENSION}_compression_spz`];
 
-/** From a cloud's frame (right, down, forward) to left, up, forward, which the extension says SPZ is unpacked to for glTF. */
+/** From the coordinates of a cloud (right, down, forward) to left, up, forward: the extension unpacks SPZ to these. */
 const SPZ_TO_GLTF = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 
-/** True if a primitive holds splats. */
+/** Whether a primitive holds splats. */
 export function isSplats(primitive: unknown): primitive is Json {
   return isObject(primitive) && isObject(primitive.extensions) && isObject(primitive.extensions[EXTENSION]);
 }
 
-/** True if the numbers of a primitive of splats lie open. */
+/** Whether a primitive of splats is uncompressed. */
 export function isUncompressed(primitive: Json): boolean {
   const { extensions } = splatsOf(primitive);
   return !isObject(extensions) || Object.keys(extensions).length === 0;
@@ -29,7 +29,7 @@ export function isUncompressed(primitive: Json): boolean {
 
 const splatsOf = ({ extensions }: Json): Json => (extensions as Json)[EXTENSION] as Json;
 
-/** Splats of a primitive whose numbers lie open, and the degree of their spherical harmonics. */
+/** Number of splats of an uncompressed primitive, and the degree of their spherical harmonics. */
 export function splatsIn(
   document: GltfDocument,
   { attributes }: Json,
@@ -40,7 +40,7 @@ export function splatsIn(
   return { count: document.accessorCount(own.POSITION), shDegree: degreeOf((name) => own[`${EXTENSION}:${name}`]) };
 }
 
-/** Scales and opacities of an uncompressed primitive as its accessors have them; none of what it lacks. */
+/** Reads scales and opacities of an uncompressed primitive as stored; missing ones are empty. */
 export async function shapesIn(
   document: GltfDocument,
   { attributes }: Json,
@@ -55,9 +55,9 @@ export async function shapesIn(
 }
 
 /**
- * Reads a primitive with `KHR_gaussian_splatting` into a cloud in the frame of its node. Scales and opacities of an uncompressed one are as its accessors have them: see
- * `activationOf`. Colors are in the space that {@link hasLinearColors} tells.
- * @param range splats of an uncompressed primitive that are read; default all
+ * Reads a primitive with `KHR_gaussian_splatting` into a cloud in the coordinates of its node. Scales and opacities of
+ * an uncompressed one are as stored: see `activationOf`. Their color space is given by {@link hasLinearColors}.
+ * @param range Splats of an uncompressed primitive to read; default all.
  */
 export async function readPrimitive(
   document: GltfDocument,
@@ -98,10 +98,10 @@ async function readNumbers(
 
 const LINEAR = 'lin_rec709_display';
 
-/** Whether the colors of a primitive of splats are linear light. */
+/** Whether the colors of a primitive of splats are linear. */
 export const hasLinearColors = (primitive: Json): boolean => splatsOf(primitive).colorSpace === LINEAR;
 
-/** Values that are drawn as they are meant; the first is taken for all others. */
+/** Supported values; the first also replaces unsupported ones. */
 const KNOWN = {
   kernel: ['ellipse'],
   colorSpace: ['srgb_rec709_display', LINEAR],
@@ -109,7 +109,10 @@ const KNOWN = {
   sortingMethod: ['cameraDistance'],
 } as const;
 
-/** Names values that other extensions define: a file that cannot do without these requires them, and is refused then. */
+/**
+ * Warns of values that other extensions define. A file that depends on such an extension requires it, and is rejected
+ * then.
+ */
 function noteUnknown(cloud: DraftCloud, splats: Json): void {
   for (const [property, known] of Object.entries(KNOWN)) {
     const value = splats[property];
@@ -147,7 +150,7 @@ async function readAttributes(
   range: SplatRange | undefined,
 ): Promise<DraftCloud> {
   const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
-  // Drafts wrote _SCALE and _ROTATION.
+  // Drafts used _SCALE and _ROTATION.
   const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
   const { count: all } = splatsIn(document, primitive, path);
   const count = range ? range.end - range.first : all;
@@ -161,7 +164,7 @@ async function readAttributes(
     }
     return data.values;
   };
-  // Positions come first: they are there, or there is no file long enough for what is allocated below.
+  // Positions are read first, so that a file without them fails before the allocation below.
   const positions = await read('POSITION', attributes.POSITION, 3);
   const cloud = allocateCloud(count, degreeOf(own), document);
   cloud.positions.set(positions);
@@ -179,12 +182,12 @@ function degreeOf(own: (name: string) => unknown): ShDegree {
   return bands.findLast((degree) => own(`SH_DEGREE_${degree}_COEF_0`) !== undefined) ?? 0;
 }
 
-/** Drafts had no opacities but those of the colours. */
+/** Drafts stored opacities only in the colors. */
 function setAlphas({ opacities }: DraftCloud, colours: Float32Array): void {
   for (let i = 0; i < opacities.length; i++) opacities[i] = colours[4 * i + 3];
 }
 
-/** glTF writes quaternions (x, y, z, w). */
+/** glTF stores quaternions as (x, y, z, w). */
 function toWFirst(source: Float32Array, out: Float32Array): void {
   for (let i = 0; i < out.length; i += 4) {
     out[i] = source[i + 3];

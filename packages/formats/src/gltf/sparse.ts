@@ -4,18 +4,21 @@ import { isObject } from '../json.js';
 import type { SplatRange } from '../scene-format.js';
 import { COMPONENTS, type GltfDocument } from './document.js';
 
-/** What the numbers of a sparse accessor are. */
+/** Destination of the numbers of a sparse accessor. */
 interface SparseTarget {
   readonly path: string;
   readonly componentType: unknown;
-  /** Elements of the accessor, and which of them `values` holds. */
+  /** Number of elements of the accessor, and the range of them in `values`. */
   readonly count: number;
   readonly range: SplatRange;
   readonly width: number;
   readonly values: Float32Array;
 }
 
-/** Puts the numbers of a sparse accessor in the place of others, as they are stored. Throws `decode/header`, `decode/corrupt` or `decode/truncated`. */
+/**
+ * Writes the numbers of a sparse accessor over others, as stored. Throws `decode/header`, `decode/corrupt` or
+ * `decode/truncated`.
+ */
 export async function putSparse(document: GltfDocument, sparse: unknown, target: SparseTarget): Promise<void> {
   const path = `${target.path}.sparse`;
   const { count, indices, values } = isObject(sparse) ? sparse : document.fail(path, 'an object', sparse);
@@ -39,7 +42,7 @@ export async function putSparse(document: GltfDocument, sparse: unknown, target:
   }
 }
 
-/** A way to so many numbers that lie one behind the other in a view. */
+/** Returns a getter for contiguous numbers in a view. */
 async function numbersIn(
   document: GltfDocument,
   place: unknown,

@@ -5,25 +5,25 @@ import { KSPLAT_HEADER_BYTES as HEADER_BYTES } from '../signatures.js';
 
 const SECTION_HEADER_BYTES = 1024;
 
-/** How the numbers of each compression level are stored: bytes of one coordinate, scale or quaternion component, and of one coefficient. */
+/** Storage of each compression level: bytes of one coordinate, scale or quaternion component, and of one coefficient. */
 const LEVELS = [
   { number: 4, coefficient: 4 },
   { number: 2, coefficient: 2 },
   { number: 2, coefficient: 1 },
 ] as const;
 
-/** Positions of levels 1 and 2 are 16-bit offsets of this range, where the section does not say otherwise. */
+/** Positions of levels 1 and 2 are 16-bit offsets with this range, unless the section declares another. */
 const DEFAULT_RANGE = 32_767;
 const COEFFICIENTS = [0, 9, 24, 45];
 
-/** One section: its splats lie in buckets, cubes whose centres positions are relative to. */
+/** One section: its positions are relative to the centers of buckets, which are cubes. */
 export interface KsplatSection {
   readonly count: number;
   readonly degree: ShDegree;
   readonly bytesPerSplat: number;
   /** Byte of the first splat. */
   readonly splatsAt: number;
-  /** Byte of the first bucket's centre, three float32. */
+  /** Byte of the first bucket's center, three float32. */
   readonly bucketsAt: number;
   readonly bucketStride: number;
   readonly bucketCount: number;
@@ -33,23 +33,26 @@ export interface KsplatSection {
   /** Byte of the number of splats, uint32, of each bucket that is not full. */
   readonly partialSizesAt: number;
   readonly partialBuckets: number;
-  /** World units of one step of a position, and the step of a bucket's centre. */
+  /** World units of one step of a position, and the step of a bucket's center. */
   readonly positionStep: number;
   readonly positionRange: number;
 }
 
 export interface KsplatHeader {
   readonly level: 0 | 1 | 2;
-  /** Splats of all sections. */
+  /** Total number of splats. */
   readonly count: number;
   /** The highest degree of all sections. */
   readonly degree: ShDegree;
-  /** What the bytes 0 and 255 of the coefficients of level 2 stand for. */
+  /** Values of the bytes 0 and 255 of the coefficients of level 2. */
   readonly coefficientRange: readonly [number, number];
   readonly sections: readonly KsplatSection[];
 }
 
-/** Reads and checks all headers: every section lies within the file, or is shortened to what is there (`isPrefix`). */
+/**
+ * Parses and validates all headers: every section lies within the file, or is shortened to its available part
+ * (`isPrefix`).
+ */
 export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = false): KsplatHeader {
   if (bytes.length < HEADER_BYTES) throw cut(bytes, name, HEADER_BYTES, 'a header');
   const view = viewOf(bytes);
@@ -71,7 +74,7 @@ export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = fa
 
 function parseSections(bytes: Uint8Array, name: string, level: 0 | 1 | 2): KsplatSection[] {
   const view = viewOf(bytes);
-  // The number at byte 8, of sections that were filled, is no guide: GaussianSplats3D does not ask for it, and there are files with 0.
+  // The number of filled sections at byte 8 is unreliable: GaussianSplats3D ignores it, and some files contain 0.
   const maxSections = view.getUint32(4, true);
   const dataStart = HEADER_BYTES + SECTION_HEADER_BYTES * maxSections;
   if (dataStart > bytes.length) throw cut(bytes, name, dataStart, `${grouped(maxSections)} section headers`);

@@ -6,7 +6,7 @@ import { parseLodMeta, type LodRun } from './meta.js';
 
 /** Splats `first` to `first + count` of one SOG file of a streamed scene. */
 export interface SogRun extends SogAddress {
-  /** Number of the file: see {@link LodScene.files}. */
+  /** Index of the file: see {@link LodScene.files}. */
   readonly file: number;
   readonly first: number;
   readonly count: number;
@@ -16,39 +16,39 @@ export interface SogRun extends SogAddress {
 export interface SogAddress {
   /** Absolute address of its `meta.json`, or of a bundle. */
   readonly url: string;
-  /** What error messages call it. */
+  /** Name in error messages. */
   readonly name: string;
 }
 
-/** A part of a streamed scene, and how it looks at each level of detail that it has. */
+/** A region of a streamed scene with its levels of detail. */
 export interface LodBox {
   /** Corners, world units. */
   readonly min: readonly number[];
   readonly max: readonly number[];
-  /** One or more, the coarsest first; each with a splat or more. */
+  /** At least one, coarsest first; each has at least one splat. */
   readonly runs: readonly SogRun[];
 }
 
-/** A streamed SOG scene, of which no splat has been read. */
+/** A streamed SOG scene, before any splat is read. */
 export interface LodScene {
   readonly boxes: readonly LodBox[];
   /** Paths of all files, relative to the index. */
   readonly files: readonly string[];
-  /** Splats that are always shown, if there are any. */
+  /** Splats that are always shown, or undefined. */
   readonly environment: SogAddress | undefined;
 }
 
-/** Splats of all levels together that an index may name. */
+/** Maximum number of splats over all levels of an index. */
 const MOST_SPLATS = 2 ** 31;
-/** Charged for each file: its addresses, and the parsing of them. */
+/** Charge for each file: its addresses, and the parsing of them. */
 const FILE_BYTES = 512;
-/** What is allocated for each before any is there: bounds and state of each 256. */
+/** Memory of each splat before any is loaded: bounds and state of each 256. */
 const KEPT_BYTES = 32 / 256;
 
 /**
- * Reads the index of a streamed SOG scene, `lod-meta.json`, for those who fetch it box by box.
- * @param name what error messages call it
- * @param url absolute address of the index, which all others are relative to
+ * Reads the index of a streamed SOG scene, `lod-meta.json`, for fetching it box by box.
+ * @param name Name in error messages.
+ * @param url Absolute address of the index, the base of all others.
  * @throws GaussianSplatError `decode/header`, `decode/unsupported` for another version, `out-of-memory/budget`.
  */
 export function readLodScene(bytes: Uint8Array, name: string, url: string, limits?: LoadLimits): LodScene {
@@ -80,9 +80,9 @@ const placeOf = ({ file, offset, count }: LodRun): Pick<SogRun, 'file' | 'first'
 
 /**
  * A file of a streamed scene.
- * @param path relative to the index
- * @param name what error messages call the index
- * @param url absolute address of the index
+ * @param path Relative to the index.
+ * @param name Name of the index in error messages.
+ * @param url Absolute address of the index.
  */
 export const sogAddress = (path: string, name: string, url: string): SogAddress => ({
   url: partAddress(url, path).href,

@@ -29,15 +29,15 @@ export interface LodMeta {
   readonly leaves: readonly LodLeaf[];
 }
 
-/** An index takes some 100 bytes for each leaf and level. */
+/** An index takes about 100 bytes for each leaf and level. */
 export const MAX_INDEX_BYTES = 1 << 26;
-/** Characters of a path: servers refuse longer addresses. */
+/** Maximum length of a path in characters, because servers reject longer addresses. */
 const MAX_PATH = 2048;
 const MAX_LEVELS = 64;
 
 /**
- * Reads `lod-meta.json` in both its dialects: that of version 1 (`version`, `asset`, `count`, `counts`) and the earlier one without
- * (whose `environment` may be null). Both agree in `lodLevels`, `filenames` and `tree`.
+ * Reads `lod-meta.json` in both its dialects: version 1 (`version`, `asset`, `count`, `counts`) and the earlier one
+ * without a version (whose `environment` may be null). Both have `lodLevels`, `filenames` and `tree`.
  */
 export function parseLodMeta(source: JsonSource): LodMeta {
   const { name } = source;
@@ -74,14 +74,17 @@ function isCount(value: unknown): value is number {
   return Number.isSafeInteger(value) && (value as number) >= 0;
 }
 
-/** Walks the tree without recursion, and hands no call a node's children one by one: its depth and breadth are the file's to choose. */
+/**
+ * Walks the tree without recursion and without spreading children as arguments, because the file chooses its depth and
+ * breadth.
+ */
 function collectLeaves(root: unknown, levels: number, files: number, fail: Fail): LodLeaf[] {
   const leaves: LodLeaf[] = [];
   const open: unknown[] = [root];
   while (open.length > 0) {
     const node = open.pop();
     if (!isObject(node)) return fail('tree', 'an object for each box', node);
-    // The first child is the next.
+    // Children are pushed in reverse, so that the first is next.
     const children: unknown[] = Array.isArray(node.children) ? node.children : [];
     for (let k = children.length - 1; k >= 0; k--) open.push(children[k]);
     if (node.lods !== undefined) leaves.push(parseLeaf(node, levels, files, fail));
@@ -114,20 +117,20 @@ function parseRun(value: unknown, files: number, fail: Fail): LodRun {
   return { file: file as number, offset: offset as number, count: count as number };
 }
 
-/** A run, and what it shows: a node of the scene at a level. */
+/** A run with its node of the scene and its level. */
 export interface NodeRun extends LodRun {
   readonly node: number;
   readonly level: number;
 }
 
-/** The runs of all boxes at all levels that they have. */
+/** All runs of all boxes, at every level. */
 export function runsAtAllLevels({ leaves }: LodMeta): NodeRun[] {
   return leaves.flatMap(({ levels }, node) =>
     levels.flatMap((run, level) => (run === undefined || run.count === 0 ? [] : [{ ...run, node, level }])),
   );
 }
 
-/** The runs that show the scene at a level: of each box that level, or the nearest it has, a finer one first. */
+/** Runs of the scene at a level: of each box that level, or the nearest available one, preferring finer. */
 export function runsAtLevel({ leaves }: LodMeta, level: number): NodeRun[] {
   return leaves.flatMap(({ levels }, node) => {
     const finer = levels.slice(0, level + 1).findLast((run) => run !== undefined);

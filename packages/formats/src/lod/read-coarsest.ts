@@ -6,8 +6,9 @@ import type { LodScene, SogAddress, SogRun } from './boxes.js';
 import { cut, type FetchBytes, type SogFiles } from './sog-files.js';
 
 /**
- * The coarsest run of each box of a streamed scene, with its environment: the nodes of `levelRuns` are the numbers of the boxes, and behind them the environment. Splats
- * that cannot be drawn are left out; of a box none may be left. All files are charged to one account.
+ * Reads the coarsest run of each box of a streamed scene, and its environment: the nodes of `levelRuns` are the indices
+ * of the boxes, followed by the environment. Unusable splats are dropped; a box may become empty. All files are charged
+ * to one account.
  * @throws GaussianSplatError as `SogFiles.read`
  */
 export async function readCoarsest(
@@ -26,7 +27,7 @@ export async function readCoarsest(
     if (others) others.push([node, run]);
     else byFile.set(run.url, [[node, run]]);
   });
-  // Where one file is missing the others are not waited for.
+  // A missing file cancels the others.
   const failed = new AbortController();
   const either = AbortSignal.any([failed.signal, ...(signal ? [signal] : [])]);
   const openFile = (file: SogAddress): Promise<GaussianCloud> => files.open(file, fetch, either, budget);

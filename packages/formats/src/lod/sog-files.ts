@@ -8,33 +8,33 @@ import { partAddress } from '../fetch-scene.js';
 import { readSogPart } from '../sog/read-sog.js';
 import type { SogAddress, SogRun } from './boxes.js';
 
-/** Brings a file, or rejects; aborted when no caller waits for it any more. */
+/** Fetches a file; aborted when no caller waits for it. */
 export type FetchBytes = (url: string, signal: AbortSignal) => Promise<Uint8Array>;
 
-/** Files that are fetched and decoded at a time: one is on its way while the other is decoded. */
+/** Maximum number of files in progress: one is fetched while the other is decoded. */
 const FILES_AT_A_TIME = 2;
 
 /**
- * Runs of splats out of the SOG files of streamed scenes. A file holds many runs: those that are asked for while it is read share one reading, and the files read last
- * are kept, up to this number of bytes.
+ * Runs of splats from the SOG files of streamed scenes. A file holds many runs: concurrent requests share one read, and
+ * recently used files are cached, up to a number of bytes.
  */
 export class SogFiles {
   readonly #reads: SharedReads<GaussianCloud>;
   readonly #gate = new Gate(FILES_AT_A_TIME);
-  /** Bytes that each cloud arrived as. */
+  /** Downloaded bytes of each cloud. */
   readonly #arrived = new WeakMap<GaussianCloud, number>();
 
-  /** @param keptBytes decoded splats that are kept, default 128 MB; the last file is, however large */
+  /** @param keptBytes Limit of the cache of decoded splats, default 128 MB; the last file is always kept. */
   constructor(keptBytes?: number) {
     this.#reads = new SharedReads(byteLengthOf, keptBytes);
   }
 
   /**
-   * Reads the splats of a run, those left out that cannot be drawn.
-   * @param fetch brings the files that are not here
-   * @param budget the account of the scene; without it each file has its own
-   * @throws GaussianSplatError `decode/*`, `decode/corrupt` for a run that reaches beyond its file, `decode/empty` for one without a splat that can be drawn, `out-of-memory/budget`; what `fetch` throws; the
-   * reason of `signal` as soon as that is aborted.
+   * Reads the splats of a run, without unusable ones.
+   * @param fetch Fetches uncached files.
+   * @param budget Account of the scene; without it each file has its own.
+   * @throws GaussianSplatError `decode/*`, `decode/corrupt` for a run beyond its file, `decode/empty` for one without
+   * usable splats, `out-of-memory/budget`; errors of `fetch`; the reason of `signal` as soon as that is aborted.
    */
   async read(
     run: Omit<SogRun, 'file'>,
@@ -52,12 +52,12 @@ export class SogFiles {
     });
   }
 
-  /** All splats of a file, in its order; not to be changed. Throws as {@link read} does. */
+  /** All splats of a file, in its order; read-only. Throws as {@link read} does. */
   async open(file: SogAddress, fetch: FetchBytes, signal?: AbortSignal, budget?: LoadBudget): Promise<GaussianCloud> {
     const isKept = this.#reads.has(file.url);
-    // One that another scene reads ends by the budget of that scene.
+    // A read that another scene started is limited by the budget of that scene.
     const cloud = await this.#reads.read(file.url, (ended) => this.#read(file, fetch, ended, budget), signal, budget);
-    // It costs nothing more, but what is taken of it is charged.
+    // A cached file costs nothing more, but copies of its splats are charged.
     if (isKept) budget?.arrive(this.#arrived.get(cloud) ?? 0);
     return cloud;
   }
@@ -98,9 +98,9 @@ const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianC
   [positions, scales, rotations, opacities, sh].reduce((sum, { byteLength }) => sum + byteLength, 0);
 
 /**
- * Some splats of a cloud, with arrays of their own.
- * @param budget is charged for them
- * @throws GaussianSplatError `decode/corrupt` if the cloud has not as many
+ * Copies some splats of a cloud to new arrays.
+ * @param budget Is charged for them.
+ * @throws GaussianSplatError `decode/corrupt` if the cloud has too few.
  */
 export function cut(cloud: GaussianCloud, run: Omit<SogRun, 'file'>, budget?: LoadBudget): GaussianCloud {
   const { first, count, name } = run;
@@ -125,7 +125,7 @@ export function cut(cloud: GaussianCloud, run: Omit<SogRun, 'file'>, budget?: Lo
   };
 }
 
-/** Lets a fixed number in at a time, in the order in which they came. */
+/** A first-in, first-out semaphore. */
 class Gate {
   #free: number;
   readonly #queue: (() => void)[] = [];
@@ -134,7 +134,7 @@ class Gate {
     this.#free = places;
   }
 
-  /** Waits for a place. @returns what gives it back */
+  /** Waits for a permit. @returns A function that releases it. */
   async enter(): Promise<() => void> {
     if (this.#free > 0) this.#free--;
     else await new Promise<void>((resolve) => this.#queue.push(resolve));

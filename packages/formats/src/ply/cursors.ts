@@ -3,11 +3,11 @@ import { grouped, quote, viewOf } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
 import { sizeOf, type ScalarType } from './header.js';
 
-/** Reads the values of a PLY body one after another, for bodies whose rows have no fixed size. */
+/** Reads the values of a PLY body in sequence, for rows without a fixed size. */
 export interface ValueCursor {
-  /** Byte of the file that is read next. */
+  /** Offset of the next byte. */
   readonly position: number;
-  /** True once a value was asked for that the file no longer holds. */
+  /** Whether a value beyond the end of the file was requested. */
   readonly ended: boolean;
   /** The next value, or NaN at the end of the file. */
   next(type: ScalarType): number;
@@ -30,7 +30,7 @@ export function scalarGetter(type: ScalarType, littleEndian: boolean): (view: Da
       return (view, at) => view.getInt32(at, littleEndian);
     case 'uint32':
       return (view, at) => view.getUint32(at, littleEndian);
-    // Beyond 2⁵³ rounded, as float64 is.
+    // Rounded beyond 2⁵³, as in float64.
     case 'int64':
       return (view, at) => Number(view.getBigInt64(at, littleEndian));
     case 'uint64':
@@ -68,11 +68,11 @@ export class BinaryCursor implements ValueCursor {
 }
 
 const SPACE = 32;
-/** Spellings of values that are no numbers, as C libraries print them; they are dropped later with their splats. */
+/** Spellings of non-finite numbers by C libraries; their splats are dropped later. */
 const NOT_A_NUMBER = /^[+-]?(nan(\(.*\))?|1\.#(ind|qnan|snan)0*)$/i;
 const INFINITE = /^[+-]?(inf(inity)?|1\.#inf0*)$/i;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
-/** Longest run of characters that can be a number; float64 prints need 25. */
+/** Maximum length of a number in characters; float64 prints need 25. */
 const MAX_TOKEN = 256;
 
 export class AsciiCursor implements ValueCursor {
@@ -87,7 +87,7 @@ export class AsciiCursor implements ValueCursor {
 
   next(): number {
     const token = this.#token();
-    // Number() reads the plain spellings exactly; the patterns are only for the rest.
+    // Number() parses the plain spellings exactly; the patterns are only for the rest.
     const value = Number(token);
     if (token === '' || (value === value && NUMBER.test(token))) return token === '' ? NaN : value;
     if (NOT_A_NUMBER.test(token)) return NaN;
@@ -99,7 +99,7 @@ export class AsciiCursor implements ValueCursor {
     for (let i = 0; i < count && !this.ended; i++) this.#token();
   }
 
-  /** The next run of characters above the space; empty at the end of the file. */
+  /** The next run of non-space characters; empty at the end of the file. */
   #token(): string {
     const { bytes, isPrefix } = this.#source;
     let start = this.position;
@@ -110,7 +110,7 @@ export class AsciiCursor implements ValueCursor {
       token += String.fromCharCode(bytes[end++]);
     }
     this.position = end;
-    // Of a file that is still arriving the last one may have more digits.
+    // The last token of a file that is still loading may be incomplete.
     this.ended = token === '' || (isPrefix === true && end === bytes.length);
     return token.length > MAX_TOKEN ? this.#fail(token) : token;
   }

@@ -5,18 +5,18 @@ import type { PlyElement, PlyHeader, PlyProperty } from './header.js';
 import type * as meaning from './meaning.js';
 import type { ColumnTarget } from './rows.js';
 
-/** How the splats of a PLY file are laid out, as far as files differ. */
+/** Layout of the splats in a PLY file, in the aspects that vary. */
 export interface GaussianLayout {
   readonly vertex: PlyElement;
   /** Degree of the file's spherical harmonics. */
   readonly degree: ShDegree | 4;
   readonly opacity: PlyProperty;
-  /** Properties of the constant colour: SH coefficients, or plain colours to convert. */
+  /** Properties of the constant color: SH coefficients, or plain colors to convert. */
   readonly colour: readonly PlyProperty[];
   readonly colourIsSh: boolean;
   /** False for 2D Gaussians (2DGS): discs without a third axis. */
   readonly hasThirdScale: boolean;
-  /** Mip-Splatting: sizes and opacities are those before its filter, whose width each splat has. */
+  /** Mip-Splatting: sizes and opacities are those before its filter, whose width is stored for each splat. */
   readonly hasFilter: boolean;
 }
 
@@ -55,7 +55,7 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
   };
 }
 
-/** A header with the names that splats have: CloudCompare writes `scalar_opacity` for `opacity`. */
+/** Returns a header with the standard names: CloudCompare writes `scalar_opacity` for `opacity`. */
 export function withPlainNames(header: PlyHeader): PlyHeader {
   const plain = ({ properties, ...element }: PlyElement): PlyElement => {
     const names = new Set(properties.map(({ name }) => name));
@@ -69,8 +69,8 @@ export function withPlainNames(header: PlyHeader): PlyHeader {
 }
 
 /**
- * Degree of the spherical harmonics of an element with properties `f_rest_0`, `f_rest_1`, ...; their number is
- * 3·((d + 1)² - 1). Throws `decode/header` for any other number or a gap in the numbering.
+ * Degree of the spherical harmonics of an element with properties `f_rest_0`, `f_rest_1`, ...; their number is 3·((d +
+ * 1)² - 1). Throws `decode/header` for any other number or a gap in the numbering.
  */
 export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree | 4 {
   const rest = element.properties.filter((property) => /^f_rest_\d+$/.test(property.name));
@@ -87,8 +87,8 @@ export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree |
 }
 
 /**
- * Where the properties `f_rest_*` go. They hold the coefficients above the constant one channel by channel, red first;
- * a cloud holds the channels side by side. `degree` is that of the file; bands above the cloud's degree are left out.
+ * Destinations of the properties `f_rest_*`. They hold the coefficients above the constant one channel by channel, red
+ * first; a cloud interleaves the channels. `degree` is that of the file; bands above the cloud's degree are skipped.
  */
 export function harmonicTargets(degree: number, cloud: DraftCloud): ColumnTarget[] {
   const kept = shCoefficientCount(cloud.shDegree);
@@ -103,14 +103,14 @@ export function harmonicTargets(degree: number, cloud: DraftCloud): ColumnTarget
   return targets;
 }
 
-/** Properties that plain splats have, up to degree 3, packed ones too; normals mean nothing. */
+/** Standard properties of splats up to degree 3, including packed ones; normals are ignored. */
 export const PLAIN = /^(n?[xyz]|f_dc_\d|f_rest_([1-3]?\d|4[0-4])|opacity|(scale|rot)_\d|red|green|blue|packed_.*)$/;
-/** Elements that say what the vertices are, or that are drawn beside them. */
+/** Elements that change the meaning of the vertices, or that are drawn in addition. */
 const ODD = /^(face|tristrips|codebook_centers)$/;
-/** LAM writes offsets from a mesh in place of positions, and only the name of the file tells it. */
+/** LAM stores offsets from a mesh instead of positions, and only the file name reveals it. */
 export const OFFSETS = /offset\.ply$/i;
 
-/** What knows the meaning of a header that says more than which numbers follow; undefined for all others. */
+/** Loads the metadata reader for a header with more than plain splats; undefined for all others. */
 export async function loadMeaning(
   { comments, elements }: PlyHeader,
   fileName: string,
@@ -129,7 +129,7 @@ export async function loadMeaning(
 export const importMeaning = (): Promise<typeof meaning> =>
   loadModule('the code that reads what a PLY says of itself', () => import('./meaning.js'));
 
-/** Element and property by which SHARP names the space of colors. */
+/** Element and property of SHARP's color space. */
 export const COLOR_SPACE = 'color_space';
 
 function notSplats(source: SceneSource, expected: string, found: string): GaussianSplatError {

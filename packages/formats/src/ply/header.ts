@@ -13,7 +13,7 @@ export interface PlyProperty {
   readonly name: string;
   /** Type of the value, or of each value of a list. */
   readonly type: ScalarType;
-  /** Type of the number of values that precedes a list; absent for a scalar. */
+  /** Type of a list's length; absent for a scalar. */
   readonly listCountType?: ScalarType;
 }
 
@@ -29,11 +29,14 @@ export interface PlyHeader {
   readonly elements: readonly PlyElement[];
   /** Text after the word `comment` of every comment line. */
   readonly comments: readonly string[];
-  /** Byte of the file where the data begins. */
+  /** Offset of the first byte of the data. */
   readonly dataStart: number;
 }
 
-/** Both spellings of every type: that of the PLY specification and the one with sizes. Integers of 64 bits are in no specification, but in files. */
+/**
+ * Both spellings of every type: that of the PLY specification and the one with sizes. 64-bit integers are not in the
+ * specification, but occur in files.
+ */
 const TYPES: ReadonlyMap<string, ScalarType> = new Map([
   ...SCALARS.map((type): [string, ScalarType] => [type, type]),
   ['char', 'int8'],
@@ -59,16 +62,19 @@ export function sizeOf(type: ScalarType): number {
   return Number(/\d+/.exec(type)) / 8;
 }
 
-/** True of types with numbers that float32 rounds: coordinates of these have an origin, which all splats together decide. */
+/** Whether float32 rounds numbers of this type: such coordinates need an origin, which depends on all splats. */
 export function exceedsFloat32(type: ScalarType): boolean {
   return type !== 'float32' && sizeOf(type) >= 4;
 }
 
-/** Reads the header of a PLY file; line ends may be LF, CRLF or CR. Throws `decode/header` or `decode/truncated`. */
+/** Parses the header of a PLY file; line ends may be LF, CRLF or CR. Throws `decode/header` or `decode/truncated`. */
 export function parsePlyHeader(source: SceneSource): PlyHeader {
   const { lines, dataStart } = splitHeader(source);
   const elements: { name: string; count: number; properties: PlyProperty[] }[] = [];
-  /** Names of all elements, and of the properties of the last: a header may have a hundred thousand lines. */
+  /**
+   * Sets of the names of all elements, and of the properties of the last one, because a header may have a hundred
+   * thousand lines.
+   */
   const [names, own] = [new Set<string>(), new Set<string>()];
   const comments: string[] = [];
   let encoding: PlyHeader['encoding'] | undefined;
@@ -118,12 +124,12 @@ function parseProperty(words: readonly string[], properties: Set<string>, fail: 
   return { name, type, listCountType };
 }
 
-/** Lines up to, not including, `end_header`, and the byte after that line. */
+/** Lines before `end_header`, and the offset after that line. */
 function splitHeader(source: SceneSource, length = USUAL_HEADER_BYTES): { lines: string[]; dataStart: number } {
   const { bytes, name } = source;
   const text = asciiOf(bytes, 0, length);
-  // With lone CRs a first data byte of 10 belongs to the data; otherwise LF ends every line and a CR before it is part
-  // of the line end.
+  // If line ends are lone CRs, a first data byte of 10 belongs to the data; otherwise LF ends every line and a CR
+  // before it is part of the line end.
   const usesLoneCr = /^[^\r\n]*\r(?!\n)/.test(text);
   const end = (usesLoneCr ? /\rend_header[ \t]*(\r|$)/ : /\nend_header[ \t]*\r?(\n|$)/).exec(text);
   const isWithin = end !== null && end.index + end[0].length < length;

@@ -1,4 +1,7 @@
-/** What the header of a PLY says beside its numbers. Loaded only for files that have comments, or properties that change what the others mean. */
+/**
+ * Metadata in the header of a PLY. Loaded only for files with comments, or with properties that change the meaning of
+ * others.
+ */
 import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
@@ -6,15 +9,15 @@ import { DEGREE_4, FLAT, warn } from '../faults.js';
 import { OFFSETS, PLAIN } from './gaussian-layout.js';
 import type { PlyHeader } from './header.js';
 
-/** Variance in px² with which Mip-Splatting and Brush's mip mode train. */
+/** Filter variance in px² in the training of Mip-Splatting and of Brush's mip mode. */
 export const MIP_VARIANCE = 0.1;
 
-/** The key of the comment that says how a scene was sorted in training. */
+/** Key of the comment with the sort order of training. */
 const SORTING = /^sort(?:ing)?_?(?:method|mode)\s*[:=]?\s*(\S+)$/i;
-/** No trainer writes it yet: `pixel`, and the names that StopThePop's settings have for its ways to sort pixel by pixel. */
+/** No trainer writes it yet: `pixel`, and the names of per-pixel sorting in StopThePop's settings. */
 const ORDERS_PIXELS = /^(per_?)?pixel|^(hierarchical|full_sort|k_?buffer)$/;
 
-/** Text of the comments that follow a key such as `Vertical Axis:`; the last one wins, as in the tools that write them. */
+/** Text of the comments after a key such as `Vertical Axis:`; the last one wins, as in the tools that write them. */
 function valueOf(comments: readonly string[], key: RegExp): string | undefined {
   return comments
     .map((text) => key.exec(text.trim()))
@@ -23,7 +26,7 @@ function valueOf(comments: readonly string[], key: RegExp): string | undefined {
     .toLowerCase();
 }
 
-/** Sets what the comments of a header tell: filter, order, up, and the tool that wrote the file. */
+/** Sets the metadata of a header's comments: filter, order, up, and the tool that wrote the file. */
 export function readComments(cloud: DraftCloud, comments: readonly string[]): void {
   const mode = valueOf(comments, /^splatrendermode\s*:\s*(.*)$/i);
   if (mode !== undefined) cloud.antialiased = mode === 'mip';
@@ -39,7 +42,10 @@ export function readComments(cloud: DraftCloud, comments: readonly string[]): vo
   if (generator !== undefined) cloud.hints = { ...cloud.hints, generator };
 }
 
-/** nerfstudio writes `Vertical Axis: z` for +z; Brush writes the direction, or an axis, which it reads as the one that points down. */
+/**
+ * nerfstudio writes `Vertical Axis: z` for +z; Brush writes the direction, or an axis, which it interprets as pointing
+ * down.
+ */
 function upOf(comments: readonly string[]): Vector3 | undefined {
   const text = valueOf(comments, /^vertical\s+axis\s*:\s*(.*)$/i);
   if (text === undefined) return undefined;
@@ -57,8 +63,8 @@ function upOf(comments: readonly string[]): Vector3 | undefined {
 }
 
 /**
- * What Mip-Splatting draws: Gaussians that its 3D smoothing filter has widened, as pale as they are wider (Yu et al. 2024, section 4.1; `create_fused_ply` of its code does
- * the same). Its training keeps them apart from the filter.
+ * Applies the 3D smoothing filter of Mip-Splatting: it widens Gaussians and reduces their opacity accordingly (Yu et
+ * al. 2024, section 4.1; same as `create_fused_ply` of its code). Training stores the filter separately.
  */
 export function fuseFilter(cloud: DraftCloud, filter: Float32Array): void {
   const { count, scales, opacities } = cloud;
@@ -75,11 +81,11 @@ export function fuseFilter(cloud: DraftCloud, filter: Float32Array): void {
   }
 }
 
-/** Properties that are read here, and others that say nothing about what is drawn: labels and measures of training. */
+/** Supported properties, and others that do not affect drawing: labels and training statistics. */
 const READ =
   /^(filter_3D|f_rest_\d+|alpha|(obj|sem|semantic|instance|label|class|object|segment|confidence|kl|id)(_.*)?)$/i;
 
-/** Says what of a file of splats is not drawn, and what may mean something else than what is drawn. */
+/** Warns of content that is not drawn, or may be misinterpreted. */
 export function noteLeftOut(cloud: DraftCloud, { elements }: PlyHeader, fileName: string): void {
   const properties = (name: string): string[] =>
     elements
@@ -108,8 +114,8 @@ export function noteLeftOut(cloud: DraftCloud, { elements }: PlyHeader, fileName
 }
 
 /**
- * Warns of numbers that look activated: trained scenes have negative logits, and splats of less than one unit.
- * @param hasLargeScales whether no logarithm of a scale is below 0, too
+ * Warns of numbers that look activated: trained scenes have negative logits, and splats smaller than one unit.
+ * @param hasLargeScales Whether also no logarithm of a scale is below 0.
  */
 export function noteActivated(cloud: DraftCloud, hasLargeScales: boolean): void {
   warn(
@@ -120,7 +126,7 @@ export function noteActivated(cloud: DraftCloud, hasLargeScales: boolean): void 
   );
 }
 
-/** Kinds of splats that are no plain ones though their names may be the same: told by a name that no other kind has. */
+/** Other kinds of splats whose property names may be the same: recognized by a unique name. */
 const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
   {
     mark: /^(trbf_center|motion_\d+|omega_\d+)$/,
@@ -144,7 +150,7 @@ const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; 
   },
 ];
 
-/** Throws `decode/unsupported` where names tell that the numbers mean something else than in a PLY of plain splats. */
+/** Throws `decode/unsupported` if names show that the numbers have another meaning than in plain splats. */
 export function refuseOtherMeanings(where: string, { elements }: PlyHeader): void {
   const names = elements.flatMap(({ name, properties }) => [name, ...properties.map((property) => property.name)]);
   for (const { mark, found, remedy } of OTHER_MEANINGS) {

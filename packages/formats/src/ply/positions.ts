@@ -6,12 +6,12 @@ export interface RelativePositions {
   readonly positions: Float32Array;
 }
 
-/** Coordinates at most this many are sampled for the origin. */
+/** Maximum number of coordinates that are sampled for the origin. */
 const SAMPLE_LIMIT = 16_384;
 
 /**
- * Moves the origin into the middle of a scene that lies far from (0, 0, 0), as georeferenced ones do, so that float32
- * keeps the detail that float64 has. The origin stays (0, 0, 0) where float32 holds every coordinate exactly.
+ * Moves the origin to the center of a scene far from (0, 0, 0), such as a georeferenced one, so that float32 keeps the
+ * detail of float64. The origin stays (0, 0, 0) if float32 represents every coordinate exactly.
  */
 export function relativePositions(world: Float64Array): RelativePositions {
   const isExact = world.every((value) => Math.fround(value) === value || !Number.isFinite(value));
@@ -21,7 +21,7 @@ export function relativePositions(world: Float64Array): RelativePositions {
   return { origin, positions };
 }
 
-/** Median of one axis: unlike a mean or a box it is not moved by outliers. */
+/** Median of one axis, which is robust to outliers, unlike a mean or a box. */
 function medianOf(world: Float64Array, axis: number): number {
   const step = 3 * Math.max(1, Math.ceil(world.length / 3 / SAMPLE_LIMIT));
   const sample: number[] = [];

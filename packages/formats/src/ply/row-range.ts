@@ -8,11 +8,11 @@ import { COLOR_SPACE, findGaussians, withPlainNames } from './gaussian-layout.js
 import { exceedsFloat32, parsePlyHeader } from './header.js';
 import { openElement } from './rows.js';
 
-/** Where the splats of a PLY lie, or undefined if its rows differ in size or depend on one another. */
+/** Returns the location of a PLY's splats, or undefined if its rows differ in size or depend on one another. */
 export function plyRanges(source: SceneSource): SplatRanges | undefined {
   const header = withPlainNames(parsePlyHeader(source));
   const { vertex, degree } = findGaussians(source, header);
-  // What it says stands behind all rows.
+  // The color-space element follows all rows.
   if (header.elements.some(({ name }) => name === COLOR_SPACE)) return undefined;
   const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
   const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && exceedsFloat32(type));
@@ -20,7 +20,7 @@ export function plyRanges(source: SceneSource): SplatRanges | undefined {
   return { count: vertex.count, shDegree: keptDegree(degree), rows: { start, byteLength: rowBytes } };
 }
 
-/** Reads some rows of a PLY: of a file that has its header, and then these rows alone. */
+/** Reads some rows of a PLY, from a file with its header followed by only these rows. */
 export function readPlyRange(source: SceneSource & { readonly range: SplatRange }): Promise<GaussianCloud> {
   const { bytes, range } = source;
   const { start, rowBytes = 0 } = openElement(source, parsePlyHeader(source), 'vertex');

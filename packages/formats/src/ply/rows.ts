@@ -4,7 +4,7 @@ import type { SceneSource } from '../scene-format.js';
 import { AsciiCursor, BinaryCursor, scalarGetter, type ValueCursor } from './cursors.js';
 import { sizeOf, type PlyElement, type PlyHeader } from './header.js';
 
-/** Where the values of one property go: row i to `array[i·stride + offset]`. */
+/** Destination of the values of one property: row i goes to `array[i·stride + offset]`. */
 export interface ColumnTarget {
   readonly property: string;
   readonly array: Float32Array | Float64Array | Uint32Array | Uint8Array;
@@ -12,7 +12,7 @@ export interface ColumnTarget {
   readonly offset: number;
 }
 
-/** One element of a PLY file and the byte where its first row begins. */
+/** One element of a PLY file and the offset of its first row. */
 export interface ElementData {
   readonly source: SceneSource;
   readonly encoding: PlyHeader['encoding'];
@@ -23,8 +23,8 @@ export interface ElementData {
 }
 
 /**
- * Finds an element that the header lists, skipping those before it, and checks that the file can hold its rows, so
- * that a caller may allocate for `element.count` rows. Throws `decode/truncated` if it cannot.
+ * Finds an element of the header, skipping those before it, and checks that the file can hold its rows, so that a
+ * caller may allocate for `element.count` rows. Throws `decode/truncated` otherwise.
  */
 export function openElement(source: SceneSource, header: PlyHeader, name: string): ElementData {
   const { encoding } = header;
@@ -40,14 +40,14 @@ export function openElement(source: SceneSource, header: PlyHeader, name: string
   throw new Error(`no element ${name}: callers ask only for elements of the header`);
 }
 
-/** Of a file that is still arriving, the rows that are there. */
+/** Returns the complete rows of a file that is still loading. */
 function wholeRows(data: ElementData, rowBytes: number): ElementData {
   const { element, source, start } = data;
   const rows = Math.max(0, Math.floor((source.bytes.length - start) / Math.max(1, rowBytes)));
   return { ...data, element: { ...element, count: Math.min(element.count, rows) } };
 }
 
-/** Copies properties of all rows into their targets. Throws `decode/truncated` or, for text, `decode/corrupt`. */
+/** Copies properties of all rows to their targets. Throws `decode/truncated` or, for text, `decode/corrupt`. */
 export function readColumns(data: ElementData, targets: readonly ColumnTarget[]): void {
   if (data.rowBytes === undefined) readSequentially(data, targets);
   else if (canViewAsFloats(data, targets)) readFloats(data, targets);
@@ -61,7 +61,7 @@ function fixedRowBytes(element: PlyElement, encoding: PlyHeader['encoding']): nu
   return properties.reduce((sum, property) => sum + sizeOf(property.type), 0);
 }
 
-/** Fewest bytes that a row can have; the number that bounds allocations before anything is read. */
+/** Minimum size of a row, which bounds allocations before anything is read. */
 function minimumRowBytes({ element, encoding, rowBytes }: ElementData): number {
   if (rowBytes !== undefined) return rowBytes;
   // A digit and a separator for each value of a text file.
@@ -91,7 +91,7 @@ function throwTruncated(data: ElementData, rows: number): never {
   });
 }
 
-/** Where the first row begins. */
+/** Returns a cursor at the first row. */
 export function cursorAt({ source, encoding, start }: ElementData): ValueCursor {
   return encoding === 'ascii'
     ? new AsciiCursor(source, start)
@@ -103,7 +103,7 @@ function endOf(data: ElementData): number {
   return readSequentially(data, []);
 }
 
-/** Reads rows value by value; returns the byte after the last row. */
+/** Reads rows value by value; returns the offset after the last row. */
 function readSequentially(data: ElementData, targets: readonly ColumnTarget[]): number {
   const { element } = data;
   const cursor = cursorAt(data);
@@ -122,7 +122,7 @@ function readSequentially(data: ElementData, targets: readonly ColumnTarget[]): 
   return cursor.position;
 }
 
-/** Skips a list. Throws `decode/corrupt` for a length that is none. */
+/** Skips a list. Throws `decode/corrupt` for an invalid length. */
 export function skipList(
   data: ElementData,
   cursor: ValueCursor,
@@ -144,7 +144,7 @@ export function skipList(
   cursor.skip(type, length);
 }
 
-/** Byte of each target's property within a row, and how to read it. */
+/** Offset of each target's property within a row, and its getter. */
 function locateColumns({ element, encoding }: ElementData, targets: readonly ColumnTarget[]) {
   let at = 0;
   const columns = [];
@@ -156,7 +156,7 @@ function locateColumns({ element, encoding }: ElementData, targets: readonly Col
   return columns;
 }
 
-/** Rows are visited in blocks of this many so that a block stays in the cache while its columns are copied. */
+/** Rows are processed in blocks of this size, so that a block stays in the cache while its columns are copied. */
 const BLOCK_ROWS = 256;
 
 function readFixedRows(data: ElementData, targets: readonly ColumnTarget[]): void {
@@ -189,7 +189,7 @@ function readFloats(data: ElementData, targets: readonly ColumnTarget[]): void {
   const { source, element, start } = data;
   const rowBytes = data.rowBytes ?? 0;
   const parts = columnsByArray(data, targets);
-  // Rows of a file need not begin at multiples of 4.
+  // Rows of a file need not start at multiples of 4.
   const block = new Uint8Array(BLOCK_ROWS * rowBytes);
   const floats = new Float32Array(block.buffer);
   for (let first = 0; first < element.count; first += BLOCK_ROWS) {
@@ -200,7 +200,7 @@ function readFloats(data: ElementData, targets: readonly ColumnTarget[]): void {
   }
 }
 
-/** Columns of rows of floats, and where they go in the rows of an array. */
+/** Columns of float rows, and their destinations in the rows of an array. */
 interface ArrayColumns {
   readonly array: ColumnTarget['array'];
   readonly stride: number;
@@ -208,7 +208,7 @@ interface ArrayColumns {
   readonly to: Int32Array;
 }
 
-/** Columns that go to the same array, together: row by row its numbers lie near one another. */
+/** Groups columns by destination array, so that writes of a row are close to one another. */
 function columnsByArray(data: ElementData, targets: readonly ColumnTarget[]): ArrayColumns[] {
   const columns = locateColumns(data, targets).sort((a, b) => a.target.offset - b.target.offset);
   return [...new Set(columns.map(({ target }) => target.array))].map((array) => {

@@ -5,10 +5,10 @@ import type { SceneSource } from '../scene-format.js';
 import { noParts } from '../readers/sog.js';
 
 const MAX_JSON_BYTES = 1 << 24;
-/** Signature and length of the description. */
+/** Length of the signature and of the length of the description. */
 const START_BYTES = 8;
 
-/** One property of the splats of a chunk, as it is stored. */
+/** One property of the splats of a chunk, as stored. */
 export interface RadProperty {
   readonly name: string;
   readonly encoding: string;
@@ -18,21 +18,21 @@ export interface RadProperty {
   readonly max: number;
 }
 
-/** Splats that follow one another. */
+/** Consecutive splats. */
 export interface RadChunk {
-  /** What error messages call it. */
+  /** Name in error messages. */
   readonly where: string;
   readonly count: number;
   /** Degree of the spherical harmonics, 0 to 3. */
   readonly degree: number;
-  /** Splats are the nodes of a tree: those without children are the finest level. */
+  /** Whether splats are the nodes of a tree: those without children are the finest level. */
   readonly isTree: boolean;
-  /** Entries of the file's palette of harmonics, where it tells. */
+  /** Number of entries in the file's palette of harmonics, if it declares one. */
   readonly paletteCount: number | undefined;
   readonly properties: readonly RadProperty[];
 }
 
-/** The chunks of a RAD file in their order, those too that are files of their own. A file may be one chunk alone. */
+/** Iterates over the chunks of a RAD file in order, including those in separate files. A file may be a single chunk. */
 export async function* chunksOf(source: SceneSource): AsyncGenerator<RadChunk> {
   const { bytes, name, budget } = source;
   if (startsWith(bytes, 'RADC')) {
@@ -57,7 +57,7 @@ export async function* chunksOf(source: SceneSource): AsyncGenerator<RadChunk> {
     const first = end + count(offset, `${where}.offset`);
     const last = first + count(length, `${where}.bytes`);
     if (last > bytes.length) throw damaged(where, `${grouped(last)} bytes`, grouped(bytes.length), 'decode/truncated');
-    // A list may name the same chunk again and again.
+    // A list may refer to the same chunk repeatedly.
     budget.take(length as number, where);
     yield chunkIn(source, bytes.subarray(first, last), where, entries);
   }
@@ -69,7 +69,7 @@ function chunkIn({ budget }: SceneSource, bytes: Uint8Array, where: string, pale
   if (version !== 1) throw damaged(`${where}, version`, 'version 1', show(version), 'decode/unsupported');
   if (![0, 1, 2, 3].includes(maxSh as number)) throw damaged(`${where}, maxSh`, '0 to 3', show(maxSh));
   if (!Array.isArray(properties)) throw damaged(`${where}, properties`, 'a list', show(properties), 'decode/header');
-  // Behind the description stands the length of the properties.
+  // The length of the properties follows the description.
   const payload = end + 8;
   return {
     where,
@@ -98,7 +98,7 @@ function propertyOf(property: unknown, bytes: Uint8Array, payload: number, where
   };
 }
 
-/** A description in JSON behind a signature and its length; padded to a multiple of 8 bytes. */
+/** Reads a JSON description after a signature and its length; padded to a multiple of 8 bytes. */
 function descriptionAt(
   { budget }: Pick<SceneSource, 'budget'>,
   bytes: Uint8Array,

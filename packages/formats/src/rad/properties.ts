@@ -5,20 +5,20 @@ import { damaged } from '../faults.js';
 import type { SceneSource } from '../scene-format.js';
 import type { RadProperty } from './container.js';
 
-/** Bytes of a value. */
+/** Bytes of each value. */
 const WIDTHS: Readonly<Record<string, number>> = {
   ...{ f32: 4, f16: 2, f32_lebytes: 4, f16_lebytes: 2, ln_f16: 2, u16: 2, u32: 4 },
   ...{ r8: 1, r8_delta: 1, s8: 1, s8_delta: 1, ln_0r8: 1, oct88r8: 1 },
 };
-/** Scales of code 0 are 0; codes above divide the logarithms between the bounds into so many steps. */
+/** The scale of code 0 is 0; other codes divide the logarithms between the bounds into this many steps. */
 const LOGARITHM_STEPS = 254;
 
 type Value = (at: number) => number;
 
 /**
- * The values of a property, splat by splat.
- * @param size values of a splat; columns stand one after the other in the file
- * @param count splats; undefined for as many as there are
+ * Returns the values of a property, splat by splat.
+ * @param size Number of values for each splat; columns are contiguous in the file.
+ * @param count Number of splats; undefined for all of them.
  */
 export function valuesOf(
   property: RadProperty,
@@ -47,7 +47,7 @@ export function valuesOf(
   return values;
 }
 
-/** The bytes of a property: a copy where they are changed later. */
+/** Returns the bytes of a property: a copy if they are modified later. */
 export function contentOf(
   { bytes, isDeflated, encoding }: RadProperty,
   expected: number | undefined,
@@ -62,26 +62,26 @@ export function contentOf(
   return content;
 }
 
-/** Palettes do not say how long they are. Numbers in float32 hardly become smaller. */
+/** Palettes do not declare their length. Limit of their inflation ratio, because float32 numbers hardly compress. */
 const MOST_INFLATED = 16;
 
-/** Spark writes plain deflate streams; other writers take "gz" literally. */
+/** Spark writes raw deflate streams; other writers interpret "gz" literally. */
 function inflated(bytes: Uint8Array, most: number, where: string): Uint8Array {
   const out = new Uint8Array(most);
   try {
     return startsWith(bytes, [0x1f, 0x8b]) ? gunzipSync(bytes, { out }) : inflateSync(bytes, { out });
   } catch (cause) {
-    // A stream that is longer than it should be ends in a RangeError.
+    // A stream that is too long ends in a RangeError.
     const expected = `a deflate stream of ${grouped(most)} bytes`;
     throw damaged(where, expected, (cause as Error).message || 'damage', 'decode/corrupt', cause);
   }
 }
 
-/** Reads the value with a number, counted column by column, of so many. */
+/** Returns a getter by index, counted column by column, for `all` values. */
 function reader({ encoding, min, max }: RadProperty, bytes: Uint8Array, all: number): Value {
   const view = viewOf(bytes);
   const single = new DataView(new ArrayBuffer(4));
-  /** Of values whose lowest bytes stand first, all of them, then the next. */
+  /** Joins the bytes of a value that are stored plane by plane: all lowest bytes first, then the next. */
   const interleaved = (width: number, at: number): DataView => {
     for (let k = 0; k < width; k++) single.setUint8(k, bytes[k * all + at]);
     return single;

@@ -6,7 +6,7 @@ import { parsePlyHeader, type PlyElement, type PlyHeader } from '../ply/header.j
 import { openElement, readColumns } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';
 
-/** Splats that share one row of the element `chunk`. */
+/** Number of splats with a common row of the element `chunk`. */
 const CHUNK_SPLATS = 256;
 const PACKED = ['packed_position', 'packed_rotation', 'packed_scale', 'packed_color'];
 const BOUNDS = ['min_', 'max_', 'min_scale_', 'max_scale_'].flatMap((bound) => ['x', 'y', 'z'].map((a) => bound + a));
@@ -17,16 +17,15 @@ const [MIN_POSITION, MAX_POSITION, MIN_SCALE, MAX_SCALE, MIN_COLOUR, MAX_COLOUR]
 const CHUNK_FLOATS = 18;
 
 /**
- * Reads the compressed PLY of PlayCanvas and SuperSplat: for each 256 splats their bounds, for each splat four
- * 32-bit words relative to them, and optionally 8-bit spherical harmonics. The definition followed is the
- * decompressor of splat-transform (`src/lib/readers/decompress-ply.ts`). Unlike there, opacities are kept as they are
- * and never turned into logits, so that 255 is opacity 1 and not infinite. Files with 12 chunk properties (before
- * 2024) store colours 0..1 without bounds.
+ * Reads the compressed PLY of PlayCanvas and SuperSplat: bounds for each 256 splats, four 32-bit words for each splat
+ * relative to them, and optional 8-bit spherical harmonics. Follows the decompressor of splat-transform
+ * (`src/lib/readers/decompress-ply.ts`), but keeps opacities instead of converting them to logits, so that 255 is
+ * opacity 1 and not infinite. Files with 12 chunk properties (before 2024) store colors 0..1 without bounds.
  */
 export async function readCompressedPly(source: SceneSource): Promise<GaussianCloud> {
   const header = parsePlyHeader(source);
   const { sh } = checkElements(source, header);
-  // Coefficients come after all splats; of a file that is still arriving they are left out.
+  // Coefficients come after all splats, so they are skipped in a file that is still loading.
   const degree = sh && !source.isPrefix ? shDegreeOf(source, sh) : 0;
   const chunkBounds = readChunkBounds(source, header);
   const vertexData = openElement(source, header, 'vertex');
@@ -80,7 +79,7 @@ function checkElements(source: SceneSource, header: PlyHeader): { sh: PlyElement
   return { sh };
 }
 
-/** [chunks, 18] bounds; colours without bounds of their own span 0..1. */
+/** [chunks, 18] bounds; colors without bounds span 0..1. */
 function readChunkBounds(source: SceneSource, header: PlyHeader): Float32Array {
   const data = openElement(source, header, 'chunk');
   const bounds = new Float32Array(CHUNK_FLOATS * data.element.count);
@@ -134,7 +133,10 @@ function unpack111011(
   out[at + 2] = mix(bounds[min + 2], bounds[max + 2], (word & 2047) / 2047);
 }
 
-/** Two bits for the largest component of (w, x, y, z), which is left out, and 10 bits for each other, ±1/sqrt(2). */
+/**
+ * Two bits select the largest component of (w, x, y, z), which is not stored, and 10 bits encode each of the others,
+ * ±1/sqrt(2).
+ */
 function unpackRotation(word: number, out: Float32Array, at: number): void {
   const largest = word >>> 30;
   let squares = 0;
@@ -148,7 +150,7 @@ function unpackRotation(word: number, out: Float32Array, at: number): void {
   out[at + largest] = Math.sqrt(Math.max(0, 1 - squares));
 }
 
-/** Coefficients -4..4 in 8 bits: bucket centres, save that 0 and 255 are the ends of the range themselves. */
+/** Coefficients -4..4 in 8 bits: bucket centers, except that 0 and 255 are the ends of the range. */
 const HARMONIC_OF_BYTE = Float32Array.from({ length: 256 }, (_, byte) => {
   const fraction = byte === 0 ? 0 : byte === 255 ? 1 : (byte + 0.5) / 256;
   return (fraction - 0.5) * 8;

@@ -14,16 +14,16 @@ import { isFar, movedCloud } from '../transform/moved-cloud.js';
 import { isJsonWith } from '../signatures.js';
 import { noParts } from './sog.js';
 
-/** glTF's axes are left, up and forward, seen from what is shown; a cloud's are right, down and forward. */
+/** glTF's axes are left, up and forward of the subject; a cloud's are right, down and forward. */
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 
-/** Charged for each primitive of splats, each time that the scene shows it: a short file can name the same ones over and over. */
+/** Charge for each instance of a primitive of splats, because a short file can repeat the same ones many times. */
 const PRIMITIVE_BYTES = 1024;
 
 /**
- * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives of the default scene that hold splats, each moved by its nodes
- * (spherical harmonics turn along), uncompressed or as SPZ. Degrees may differ. Meshes and points without the extension,
- * cameras, lights and animations are left out; `hints.meshes` says that there are some of the first.
+ * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives with splats of the default scene, each transformed
+ * by its nodes (including spherical harmonics), uncompressed or as SPZ. Degrees may differ. Meshes and points without
+ * the extension, cameras, lights and animations are skipped; `hints.meshes` reports the presence of meshes.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   if (isTileset(source.bytes)) {
@@ -76,7 +76,7 @@ async function readSplats(source: SceneSource): Promise<GaussianCloud> {
   return whole;
 }
 
-/** Ranges are offered of documents as the extension has them: see {@link gltfSplats}. */
+/** Ranges are offered only for documents that match the specification: see {@link gltfSplats}. */
 const PLAIN: Activation = { hasLogarithms: false, hasLogits: false, isInPlyFrame: false };
 
 const openCloudsOf = (found: readonly (PlacedSplats & { readonly cloud: GaussianCloud })[]): GaussianCloud[] =>
@@ -90,10 +90,10 @@ async function encodeColors(cloud: DraftCloud): Promise<void> {
   encodeLinearColors(cloud, 'lin_rec709_display');
 }
 
-/** Extensions that are named, at most. */
+/** Maximum number of extensions in a message. */
 const MOST_NAMED = 6;
 
-/** Says what of the file is not drawn. What else a file with meshes means is for those to say who draw them. */
+/** Warns of content that is not drawn. Other warnings of a file with meshes are left to the code that draws these. */
 function noteLeftOut(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
   const unknown = hasMeshes ? [] : unknownExtensions(json);
   const named = unknown.slice(0, MOST_NAMED).map((extension) => extension.slice(0, 80));
@@ -103,7 +103,11 @@ function noteLeftOut(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
     warn(cloud, `${grouped(animations.length)} animations are left out for splats: they are drawn as they stand.`);
 }
 
-/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, stand in another file, have numbers of another meaning than the extension gives them, or lie so far that they have an origin of their own. */
+/**
+ * Returns the number of splats in a glTF, and their degree; undefined if they cannot be read in ranges: because they
+ * are compressed, in another file, encoded differently from the specification, or far enough away to need their own
+ * origin.
+ */
 export async function gltfSplats(source: SceneSource): Promise<{ count: number; shDegree: ShDegree } | undefined> {
   const { document, placed } = open(source);
   if (
@@ -119,14 +123,14 @@ export async function gltfSplats(source: SceneSource): Promise<{ count: number; 
   return { count, shDegree };
 }
 
-/** Splats at their place in the scene, and where in the file they stand. */
+/** Splats with their transform in the scene, and their location in the file. */
 interface PlacedSplats {
   readonly primitive: Json;
   readonly path: string;
   readonly toScene: Affine;
 }
 
-/** The primitives of splats of the default scene in their order, and how many others there are. */
+/** Returns the primitives with splats of the default scene in order, and the number of others. */
 function open({ bytes, name, openPart, budget }: SceneSource): {
   document: GltfDocument;
   placed: PlacedSplats[];
@@ -150,7 +154,7 @@ function open({ bytes, name, openPart, budget }: SceneSource): {
   return { document, placed, others };
 }
 
-/** The primitives of a mesh. */
+/** Primitives of a mesh. */
 interface MeshParts {
   readonly splats: readonly Omit<PlacedSplats, 'toScene'>[];
   readonly others: number;
@@ -165,7 +169,7 @@ function partsOf(document: GltfDocument, mesh: number): MeshParts {
   return { splats, others: primitives.length - splats.length };
 }
 
-/** The part of a range that lies in `count` splats from number `at` on, counted from there. */
+/** Intersects a range with `count` splats from index `at` on; the result is relative to `at`. */
 function within({ first, end }: SplatRange, at: number, count: number): SplatRange & { count: number } {
   return { first: Math.max(0, first - at), end: Math.min(count, end - at), count };
 }

@@ -4,13 +4,16 @@ import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
 import { parseKsplatHeader, type KsplatHeader, type KsplatSection } from '../ksplat/header.js';
 import type { SceneSource } from '../scene-format.js';
 
-/** Coefficients of each band above the constant one; they are stored band by band, and red, green, blue within each. */
+/**
+ * Number of coefficients in each band above the constant one; they are stored band by band, and red, green, blue within
+ * each.
+ */
 const BANDS = [3, 5, 7];
 
 /**
- * Reads mkkellogg's `.ksplat`, the SplatBuffer of GaussianSplats3D (`src/loaders/SplatBuffer.js`): sections of splats, at level
- * 0 in float32, at 1 and 2 with 16-bit positions within buckets and float16, at 2 with coefficients in bytes. Sections
- * of a lower degree than the highest get zeros.
+ * Reads mkkellogg's `.ksplat`, the SplatBuffer of GaussianSplats3D (`src/loaders/SplatBuffer.js`): sections of splats,
+ * at level 0 in float32, at 1 and 2 with 16-bit positions within buckets and float16, at 2 with coefficients in bytes.
+ * Sections of a lower degree than the highest are padded with zeros.
  */
 export function readKsplat(source: SceneSource): GaussianCloud {
   const { bytes, name, signal, isPrefix = false } = source;
@@ -27,7 +30,7 @@ export function readKsplat(source: SceneSource): GaussianCloud {
 
 type ReadNumber = (at: number) => number;
 
-/** Unpacks the splats of one section to the places from `first` on. */
+/** Unpacks the splats of one section to the indices from `first` on. */
 function unpackSection(
   bytes: Uint8Array,
   header: KsplatHeader,
@@ -64,7 +67,7 @@ function unpackColour(bytes: Uint8Array, at: number, { sh, shDegree, opacities }
   opacities[to] = bytes[at + 3] / 255;
 }
 
-/** The centre of the bucket of each splat, [count, 3]: full buckets first, then the others with their own sizes. */
+/** Center of the bucket of each splat, [count, 3]: full buckets first, then the others with their own sizes. */
 function centresOf(view: DataView, section: KsplatSection): Float32Array {
   const { count, bucketSize, fullBuckets, partialBuckets, bucketsAt, bucketStride, partialSizesAt } = section;
   const centres = new Float32Array(3 * count);

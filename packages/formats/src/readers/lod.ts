@@ -9,8 +9,9 @@ import { readSogPart } from '../sog/read-sog.js';
 import { noParts } from './sog.js';
 
 /**
- * Reads a streamed SOG scene from its `lod-meta.json` as a whole at one level of detail (`source.level`, 0 the finest; levels
- * beyond the last give the coarsest) or at all of them (`all`), with its environment. The coarsest level is its preview.
+ * Reads a streamed SOG scene from its `lod-meta.json` at one level of detail (`source.level`, 0 is the finest; levels
+ * beyond the last give the coarsest) or at all of them (`all`), with its environment. The coarsest level is its
+ * preview.
  */
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   const { name, level = 0, mostSplats = Infinity } = source;
@@ -31,7 +32,7 @@ export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   return level === 'all' ? { ...merged, levelRuns: levelRunsOf(parts) } : merged;
 }
 
-/** Some runs, file by file. */
+/** Reads some runs, file by file. */
 async function readRuns(
   runs: readonly NodeRun[],
   { files }: LodMeta,
@@ -53,7 +54,7 @@ async function readRuns(
   return parts;
 }
 
-/** Another node than all others, at a level of its own: it is always drawn. */
+/** The environment is a separate node with one level, so that it is always drawn. */
 async function readEnvironment(
   { environment, leaves }: LodMeta,
   open: OpenPart,
@@ -64,7 +65,7 @@ async function readEnvironment(
   return [{ cloud, first: 0, count: cloud.count, node: leaves.length, level: 0 }];
 }
 
-/** One SOG of the scene; the paths in its description are relative to it. */
+/** Reads one SOG of the scene; paths in its description are relative to it. */
 async function readPart(path: string, open: OpenPart, source: SceneSource): Promise<GaussianCloud> {
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const { budget, signal } = source;
@@ -73,7 +74,7 @@ async function readPart(path: string, open: OpenPart, source: SceneSource): Prom
   return readSogPart({ bytes, name, budget, signal }, (part) => open(folder + part));
 }
 
-/** The runs must lie within the file and apart from one another: together they never hold more splats than the file. */
+/** The runs must lie within the file and not overlap, so that together they never hold more splats than the file. */
 function partsOf(cloud: GaussianCloud, runs: readonly NodeRun[], path: string, name: string): NodePart[] {
   let end = 0;
   return [...runs]

@@ -53,16 +53,16 @@ export async function readPly(source: SceneSource): Promise<GaussianCloud> {
   return cloud;
 }
 
-/** Of fewer splats all logits may lie in 0..1. */
+/** A few splats may have all logits in 0..1 by chance. */
 const LEAST_TESTED = 50;
 
-/** Whether all values lie within bounds. Most arrays of logits or logarithms end this at the first few. */
+/** Whether all values lie within bounds. For most arrays of logits or logarithms this ends at the first few. */
 function isWithin(values: Float32Array, min: number, max: number): boolean {
   for (let i = 0; i < values.length; i++) if (!(values[i] >= min && values[i] <= max)) return false;
   return true;
 }
 
-/** SHARP writes its color space as an element of one row: 0 for sRGB, 1 for linear RGB. */
+/** SHARP stores its color space as an element with one row: 0 for sRGB, 1 for linear RGB. */
 function hasLinearColors(source: SceneSource, header: PlyHeader): boolean {
   const space = header.elements.find(({ name }) => name === COLOR_SPACE);
   if (space?.count !== 1 || source.isPrefix) return false;
@@ -95,7 +95,7 @@ function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftC
   }
 }
 
-/** Targets of properties that stand side by side in every row of an array. */
+/** Targets of properties that are adjacent in every row of an array. */
 function interleaved(names: readonly string[], array: ColumnTarget['array'], stride: number): ColumnTarget[] {
   return names.map((property, offset) => ({ property, array, stride, offset }));
 }
@@ -105,10 +105,10 @@ function flatten(cloud: DraftCloud): void {
   for (let i = 0; i < cloud.count; i++) cloud.scales[3 * i + 2] = 0;
 }
 
-/** The integer that stands for 1. */
+/** The integer that represents 1. */
 const whiteOf = ({ type }: Pick<PlyProperty, 'type'>): number => (type === 'uint16' ? 65_535 : 255);
 
-/** Turns colours 0..255 (integers; 16-bit ones 0..65535) or 0..1 (floats) into the constant SH coefficient. */
+/** Converts colors 0..255 (integers; 16-bit ones 0..65535) or 0..1 (floats) to the constant SH coefficient. */
 function convertPlainColours(cloud: DraftCloud, colour: readonly PlyProperty[]): void {
   const stride = 3 * shCoefficientCount(cloud.shDegree);
   colour.forEach(({ type }, channel) => {

@@ -6,7 +6,7 @@ import { chunksOf, type RadChunk, type RadProperty } from '../rad/container.js';
 import { contentOf, valuesOf } from '../rad/properties.js';
 import type { SceneSource } from '../scene-format.js';
 
-/** Numbers of a splat's harmonics in each band above the constant one, and where they begin among all. */
+/** Numbers of a splat's harmonics in each band above the constant one, and their offset among all. */
 const BANDS = [
   { size: 9, first: 3 },
   { size: 15, first: 12 },
@@ -14,8 +14,9 @@ const BANDS = [
 ] as const;
 
 /**
- * Reads Spark's RAD (`rad.rs` of spark-lib, version 1): chunks of splats whose properties are columns, each with an encoding of its own and deflated; harmonics of each splat or out of a
- * palette; chunks in the file or beside it. Of a tree of levels the leaves are read: the splats that it was built of.
+ * Reads Spark's RAD (`rad.rs` of spark-lib, version 1): chunks of splats whose properties are columns, each with its
+ * own encoding and deflated; harmonics for each splat or from a palette; chunks in the file or in separate files. Of a
+ * tree of levels the leaves are read, which are the original splats.
  */
 export async function readRad(source: SceneSource): Promise<GaussianCloud> {
   const chunks: { chunk: RadChunk; leaves: Uint32Array }[] = [];
@@ -43,10 +44,10 @@ export async function readRad(source: SceneSource): Promise<GaussianCloud> {
   return cloud;
 }
 
-/** Numbers of the splats without children. */
+/** Indices of the splats without children. */
 function leavesOf(chunk: RadChunk, { budget }: SceneSource): Uint32Array {
   const children = chunk.isTree ? find(chunk, 'child_count') : undefined;
-  // Whatever a chunk says of its number, it has as many bytes of alpha, deflated.
+  // A chunk must contain at least as many deflated bytes of alpha as it declares splats.
   budget.take(8 * chunk.count, chunk.where);
   const counts = children && valuesOf(children, 1, chunk.count, { budget, name: chunk.where });
   const leaves = new Uint32Array(chunk.count);
@@ -58,10 +59,10 @@ function leavesOf(chunk: RadChunk, { budget }: SceneSource): Uint32Array {
 const find = ({ properties }: RadChunk, name: string): RadProperty | undefined =>
   properties.find((property) => property.name === name);
 
-/** Harmonics that splats name by a label: each band's numbers, entry by entry. */
+/** Palette of harmonics, referenced by the labels of splats: the numbers of each band, entry by entry. */
 type Palette = readonly (Float32Array | undefined)[];
 
-/** It stands in one of the chunks, the first as a rule. */
+/** One of the chunks contains it, usually the first. */
 function paletteIn(chunks: readonly RadChunk[], degree: number, { budget, name }: SceneSource): Palette {
   return BANDS.slice(0, degree).map(({ size }, band) => {
     for (const chunk of chunks) {
@@ -86,7 +87,7 @@ function fill(
     if (!property) throw damaged(where, `the property ${name}`, 'none', 'decode/header');
     return valuesOf(property, size, chunk.count, { budget, name: where });
   };
-  /** Columns of the leaves, into rows of `stride` numbers from `offset` on. */
+  /** Copies columns of the leaves to rows of `stride` numbers from `offset` on. */
   const copy = (from: Float32Array, size: number, to: Float32Array, stride: number, offset = 0): void => {
     for (let k = 0; k < leaves.length; k++)
       for (let n = 0; n < size; n++) to[stride * (at + k) + offset + n] = from[size * leaves[k] + n];
@@ -115,7 +116,7 @@ function fill(
   });
 }
 
-/** As (w, x, y, z): of an axis in an octahedron and half an angle, in 8 bits each, or of x, y and z. */
+/** Quaternions (w, x, y, z), decoded from an octahedral axis and half an angle in 8 bits each, or from x, y and z. */
 function quaternionsOf(chunk: RadChunk, budget: SceneSource['budget']): Float32Array {
   const { where, count } = chunk;
   const property = find(chunk, 'orientation');
@@ -135,7 +136,7 @@ function quaternionsOf(chunk: RadChunk, budget: SceneSource['budget']): Float32A
   return quaternions;
 }
 
-/** An octahedral direction (Meyer et al. 2010), and an angle in 255ths of a half turn. */
+/** Decodes an octahedral direction (Meyer et al. 2010), and an angle in 255ths of a half turn. */
 function unfold(codes: Uint8Array, from: number, quaternions: Float32Array, to: number): void {
   const [u, v] = [(2 * codes[from]) / 255 - 1, (2 * codes[from + 1]) / 255 - 1];
   const z = 1 - Math.abs(u) - Math.abs(v);

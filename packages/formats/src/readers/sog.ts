@@ -3,12 +3,13 @@ import type { SceneSource } from '../scene-format.js';
 import { parseSogMeta } from '../sog/meta.js';
 import { readSogImages } from '../sog/read-sog.js';
 
-/** `meta.json` and the names that lead to it; what a server appends stays. */
+/** Matches `meta.json` and similar names; a query of the server stays. */
 const LAST_PART = /[^/]*$/;
 
 /**
- * Reads a SOG scene (PlayCanvas), versions 1 and 2, from its `meta.json`: attributes quantised into the pixels of lossless WebP
- * images, coefficients above the constant one in a palette. Bundles (`.sog`) are ZIP files, which `readers/zip.ts` opens.
+ * Reads a SOG scene (PlayCanvas), versions 1 and 2, from its `meta.json`: attributes quantized into the pixels of
+ * lossless WebP images, coefficients above the constant one in a palette. Bundles (`.sog`) are ZIP files, which
+ * `readers/zip.ts` opens.
  */
 export async function readSog(source: SceneSource): Promise<GaussianCloud> {
   const meta = parseSogMeta(source);
@@ -16,8 +17,8 @@ export async function readSog(source: SceneSource): Promise<GaussianCloud> {
 }
 
 /**
- * What is said where only the description is at hand.
- * @param packed name of a file that could hold all of the scene
+ * Error for a description without its files.
+ * @param packed Name of a file format that could hold the whole scene.
  */
 export function noParts(name: string, packed = 'scene.sog'): (path: string) => Promise<never> {
   return (path) =>

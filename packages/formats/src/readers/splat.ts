@@ -6,14 +6,14 @@ import type { SceneSource } from '../scene-format.js';
 
 /**
  * Reads antimatter15's `.splat`: 32 bytes for each splat, namely float32 position and standard deviations, RGBA in
- * bytes, and the quaternion (w, x, y, z) in bytes as 128 + 128·q. There is no header and no view-dependent colour.
+ * bytes, and the quaternion (w, x, y, z) in bytes as 128 + 128·q. There is no header and no view-dependent color.
  */
 export function readSplat(source: SceneSource): GaussianCloud {
   const { name } = source;
   const count = Math.floor(source.bytes.length / SPLAT_BYTES);
   const rest = source.bytes.length % SPLAT_BYTES;
   const bytes = source.bytes.subarray(0, SPLAT_BYTES * count);
-  // The end of a line behind the last splat does no harm.
+  // A line end after the last splat is harmless.
   const isLineEnd = source.bytes.subarray(bytes.length).every((byte) => byte === 10 || byte === 13);
   if (!source.isPrefix && !isLineEnd) {
     throw new GaussianSplatError('decode/truncated', {

@@ -21,8 +21,8 @@ import { unpackSplats } from '../spz/unpack.js';
 
 /**
  * Reads Niantic's SPZ: versions 1 to 3, which are gzip files (or their inflated content), and version 4, whose
- * attributes are zstd streams. Degree 4 of the spherical harmonics is left out. Extensions are skipped, save the one
- * that names the coordinate system; without it the writer's marks decide: `assumedAxes`.
+ * attributes are zstd streams. Degree 4 of the spherical harmonics is dropped. Extensions are skipped, except the one
+ * that names the coordinate system; without it the writer's characteristics decide: `assumedAxes`.
  */
 export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   if (source.isPrefix) return readWithoutHarmonics(source);
@@ -34,7 +34,7 @@ export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   return unpackFrame(header, scene, source);
 }
 
-/** Unpacks all attributes into a cloud's frame. Few files have systems whose vertical axis is the third. */
+/** Unpacks all attributes into the coordinates of a cloud. Few files have a vertical third axis. */
 async function unpackFrame(header: SpzHeader, scene: PackedScene, source: SceneSource): Promise<GaussianCloud> {
   const cloud = unpackSplats(header, scene, source);
   if (scene.turn === undefined) return cloud;
@@ -46,13 +46,13 @@ async function unpackFrame(header: SpzHeader, scene: PackedScene, source: SceneS
   return cloud;
 }
 
-/** The header, and what the file around it says of the frame: glTF names right-up-back. */
+/** The header, and the coordinate system that the enclosing file declares: glTF uses right-up-back. */
 const headerOf = ({ name, isWithinGltf }: SceneSource, start: Uint8Array): SpzHeader => ({
   ...parseSpzHeader(start, name),
   followsSpecification: isWithinGltf,
 });
 
-/** Every so many-th splat, without coefficients above the constant one. */
+/** Every n-th splat, without coefficients above the constant one. */
 async function previewOf(
   header: SpzHeader,
   { attributes, axes, turn }: PackedScene,
@@ -74,7 +74,7 @@ function everyNth(values: Uint8Array, size: number, count: number): Uint8Array {
   return taken;
 }
 
-/** The harmonics come last and are half of a file and more: all splats are there long before its end. */
+/** The harmonics come last and are at least half of a file, so all splats are available long before its end. */
 async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud> {
   const { bytes, name } = source;
   if (startsWith(bytes, 'NGSP')) {
@@ -90,7 +90,7 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
   try {
     const header = headerOf(source, await gunzip.upTo(SPZ_HEADER_BYTES));
     const plain = { ...header, degree: 0 } as const;
-    // More than the bytes so far can hold is not there yet, or never will be.
+    // A count that the received bytes cannot hold is not available yet, or invalid.
     requirePlausibleCount(plain, bytes.length, name);
     const length = SPZ_HEADER_BYTES + bodyBytes(plain, header.version);
     return unpackLegacy(source, await gunzip.upTo(length), header);
@@ -110,7 +110,7 @@ interface SpzParts {
   readonly scene: PackedScene;
 }
 
-/** The decoder of zstd, which version 4 alone needs, is half of the code that reads SPZ. */
+/** The zstd decoder, which only version 4 needs, is half of the code that reads SPZ. */
 const loadStreams = (): Promise<typeof streams> =>
   loadModule('the code that reads SPZ version 4', () => import('../spz/streams.js'));
 
@@ -123,7 +123,7 @@ async function readPlain(source: SceneSource): Promise<SpzParts> {
   return { header, scene };
 }
 
-/** The parts of an SPZ, or the splats of another scene inside the gzip file. */
+/** The sections of an SPZ, or the splats of another scene inside the gzip file. */
 async function readGzip(source: SceneSource): Promise<SpzParts | GaussianCloud> {
   const { bytes, name } = source;
   const gunzip = new Gunzip(source);
@@ -143,12 +143,12 @@ async function readGzip(source: SceneSource): Promise<SpzParts | GaussianCloud> 
   }
 }
 
-/** A scene that was compressed as a whole, as `scene.ply.gz`. */
+/** Reads a scene that was compressed as a whole, such as `scene.ply.gz`. */
 async function readInflated(source: SceneSource, start: Uint8Array, gunzip: Gunzip): Promise<GaussianCloud> {
   const { findFormat } = await loadDetection();
   const name = source.name.replace(/\.gz$/i, '');
   const isOther = (bytes: Uint8Array): boolean => (findFormat(bytes, name, '')?.name ?? 'spz') !== 'spz';
-  // Whatever is no scene by its beginning is not inflated further.
+  // A file that does not start like a scene is not inflated further.
   if (!isOther(start)) throw await otherGzip(start, source.name);
   let bytes = start;
   for (let length = 0; bytes.length > length;) {

@@ -10,16 +10,20 @@ import { movedCloud } from '../transform/moved-cloud.js';
 import { isTileset, readGltf } from './gltf.js';
 import { noParts } from './sog.js';
 
-/** Between a cloud's frame (x right, y down, z forward) and that of tiles (z up), by way of glTF's (y up). */
+/**
+ * Converts between the coordinates of a cloud (x right, y down, z forward) and of tiles (z up), via those of glTF (y
+ * up).
+ */
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, 0, -1, 0, 0, -1, 0, 0];
-/** Tilesets within tilesets at most. */
+/** Maximum nesting of tilesets. */
 const MAX_NESTED = 16;
-/** From the middle of the Earth a tileset is georeferenced, in metres. */
+/** A tileset farther than this from the Earth's center, in meters, is georeferenced. */
 const ON_EARTH = 1e6;
 
 /**
- * Reads a tileset of 3D Tiles whose tiles are glTF with splats, as a whole at one level of detail (`source.level`, 0 the finest). Tilesets on the Earth have the direction away from its
- * middle as `hints.up`. Tiles of other kinds are left out with a warning.
+ * Reads a tileset of 3D Tiles whose tiles are glTF with splats, at one level of detail (`source.level`, 0 is the
+ * finest). Georeferenced tilesets get the direction away from the Earth's center as `hints.up`. Tiles of other kinds
+ * are skipped with a warning.
  */
 export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
   const level = source.level === 'all' ? 0 : (source.level ?? 0);
@@ -35,7 +39,7 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
       if (error instanceof GaussianSplatError && error.code === 'decode/not-splats') return undefined;
       throw error;
     });
-    // Both turns are their own inverse.
+    // Both rotations are their own inverse.
     if (cloud) clouds.push(movedCloud(cloud, multiply(TO_CLOUD, multiply(toTileset, TO_CLOUD))));
     else others++;
   }
@@ -58,11 +62,11 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
 
 type TileFile = TileContent & { readonly bytes: Uint8Array };
 
-/** The glTFs of a tileset, those too of tilesets that it names. */
+/** Iterates over the glTF files of a tileset and of nested tilesets. */
 async function* filesOf(source: SceneSource, level: number): AsyncGenerator<TileFile> {
   const { name, budget } = source;
   const left: (TileContent & { readonly depth: number })[] = [];
-  /** How often each file will be named still, and those that will. */
+  /** Remaining references to each file, and the files that have some. */
   const uses = new Map<string, number>();
   const kept = new Map<string, Uint8Array>();
   const list = (contents: readonly TileContent[], depth: number): void => {
@@ -77,7 +81,7 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
     const { uri, toTileset, depth } = content;
     const [path, query = ''] = uri.split(/(?=\?)/, 2);
     const where = `${name}, ${uri}`;
-    // Named again and again a file is fetched once, and charged each time.
+    // A repeated file is fetched once, and charged each time.
     const again = kept.get(uri);
     budget.take(again?.length ?? 0, where);
     const bytes = again ?? (await checkedPart(await opened(source, decoded(path), query), where));
@@ -111,7 +115,7 @@ function decoded(path: string): string {
   }
 }
 
-/** Away from the middle of the Earth, for a cloud at its surface. */
+/** Direction away from the Earth's center, for a cloud at its surface. */
 function upAt(origin: Vector3): Vector3 | undefined {
   const radius = Math.hypot(...origin);
   return radius < ON_EARTH ? undefined : (origin.map((x) => x / radius) as unknown as Vector3);

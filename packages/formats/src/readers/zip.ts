@@ -8,23 +8,27 @@ import { MAX_META_BYTES } from '../sog/meta.js';
 import { Archive } from '../zip/archive.js';
 import { listed, namedLike, relevant, shallowest } from '../zip/paths.js';
 
-/** Main files of scenes of several files, in the order in which they are looked for, since an index names descriptions; and how long these may be. */
+/**
+ * Main files of scenes with several files, in search order, because an index refers to descriptions; and their maximum
+ * lengths.
+ */
 const DESCRIPTIONS = [
   ['lod-meta.json', MAX_INDEX_BYTES],
   ['meta.json', MAX_META_BYTES],
   ['tileset.json', MAX_INDEX_BYTES],
 ] as const;
-/** So many files with these names are opened at most to find a scene. */
+/** Maximum number of files with these names that are opened to find a scene. */
 const MAX_DESCRIPTIONS = 16;
 const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
-/** Points that training began with, as the code of 3DGS, COLMAP and nerfstudio name them, and cameras; */
+/** Names of the initial points of training in 3DGS, COLMAP and nerfstudio, and of cameras; */
 const FIRST_POINTS = /(^|\/)(input|sparse(_pc)?|points?(3d)?|cameras?)\.ply$/i;
-/** the splats after some numbers of iterations, as the first of these writes them. */
+/** names of the splats after a number of iterations in 3DGS. */
 const ITERATION = /^(.*\/)?iteration_(\d+)\/point_cloud\.ply$/i;
 
 /**
- * Reads a ZIP file with one scene in it: a SOG bundle (`.sog`), a streamed SOG scene, glTF with its buffers, or one file of any
- * other format. The scene that lies least deep counts; of a training's output, the one after most iterations. Archives within archives are bundles and are read one deep.
+ * Reads a ZIP file with one scene in it: a SOG bundle (`.sog`), a streamed SOG scene, glTF with its buffers, or one
+ * file of any other format. The least nested scene is used; for the output of a training, the one with the most
+ * iterations. Nested archives are bundles and are read one level deep.
  */
 export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const { name } = source;
@@ -43,10 +47,10 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   return read({ ...source, bytes: inner, name: `${name}, ${path}`, openPart });
 }
 
-/** Marks an archive within an archive. */
+/** Marks a nested archive. */
 const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 
-/** Undefined where there is none. */
+/** Undefined if there is none. */
 async function mainFile(archive: Archive, name: string): Promise<string | undefined> {
   const paths = relevant(archive.paths);
   for (const [description, most] of DESCRIPTIONS) {
@@ -64,14 +68,14 @@ async function mainFile(archive: Archive, name: string): Promise<string | undefi
   if (scenes.length === 1) return scenes[0];
   const last = lastIteration(scenes);
   if (last !== undefined) return last;
-  // glTF names its other files, scenes among them.
+  // glTF names its other files, which may be scenes themselves.
   const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
   if (gltf.length === 1) return gltf[0];
   if (scenes.length > 0) throw (await namedArchive(archive, name)) ?? severalScenes(name, scenes);
   return undefined;
 }
 
-/** Of several scenes, those that are no GLB of meshes alone; all of them where nothing else is left. */
+/** Excludes GLB files with only meshes; keeps all scenes if nothing else is left. */
 function withoutMeshes(scenes: readonly string[], archive: Archive): readonly string[] {
   if (scenes.length < 2) return scenes;
   const hasSplats = (path: string): boolean => {
@@ -82,7 +86,7 @@ function withoutMeshes(scenes: readonly string[], archive: Archive): readonly st
   return left.length > 0 ? left : scenes;
 }
 
-/** The error for an archive that is known for a path in it. */
+/** The error for an archive that is recognized by a path in it. */
 async function namedArchive({ paths }: Archive, name: string): Promise<GaussianSplatError | undefined> {
   const { diagnoseArchive } = await loadDiagnosis();
   return diagnoseArchive(paths, name);
@@ -93,7 +97,7 @@ async function noSceneIn(archive: Archive, name: string): Promise<GaussianSplatE
   return (await namedArchive(archive, name)) ?? noScene(name, undefined, found);
 }
 
-/** Of the same scene after some numbers of iterations, the one after most; undefined for others. */
+/** For the same scene after several numbers of iterations, the one with the most; undefined for others. */
 function lastIteration(paths: readonly string[]): string | undefined {
   const found = paths.map((path) => ITERATION.exec(path));
   const [first] = found;

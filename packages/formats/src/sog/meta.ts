@@ -3,17 +3,20 @@ import { grouped } from '../bytes.js';
 import { damaged } from '../faults.js';
 import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
 
-/** A value of each byte 0..255, for each channel of a plane. */
+/** A value for each byte 0..255, for each channel of a plane. */
 export type ByteTable = readonly Float32Array[];
 
-/** The description of a SOG scene, of either version. */
+/** The description of a SOG scene in either version. */
 export interface SogMeta {
   readonly version: 1 | 2;
   readonly count: number;
   readonly antialiased: boolean;
-  /** Variance of the filter where the file tells it; splat-transform 3 says `model: antialiased` of what PLY calls `SplatRenderMode: mip`. */
+  /**
+   * Variance of the filter if the file declares it; splat-transform 3 writes `model: antialiased` for `SplatRenderMode:
+   * mip` of PLY.
+   */
   readonly filterVariance: number | undefined;
-  /** What our own writer says of scenes that are ordered pixel by pixel: `sortingMethod: pixel`. */
+  /** Written by our own exporter for scenes in per-pixel order: `sortingMethod: pixel`. */
   readonly order: 'pixel' | undefined;
   /** 2D Gaussians (2DGS): `model: 2dgs` of splat-transform. */
   readonly isFlat: boolean;
@@ -28,7 +31,7 @@ export interface SogMeta {
   /** Constant coefficients; version 1 has opacities as logits in a fourth table, version 2 has opacities in bytes. */
   readonly sh0: { readonly values: ByteTable; readonly files: readonly string[] };
   readonly shN?: {
-    /** Undefined where only the width of the centroids tells it (version 1). */
+    /** Undefined if only the width of the centroids determines it (version 1). */
     readonly degree: ShDegree | undefined;
     readonly paletteSize: number;
     readonly values: Float32Array;
@@ -36,12 +39,12 @@ export interface SogMeta {
   };
 }
 
-/** A description has a few codebooks of 256 numbers; a larger file is none. */
+/** A description has a few codebooks of 256 numbers; a larger file is invalid. */
 export const MAX_META_BYTES = 1 << 20;
 /** Labels have 16 bits. */
 const MAX_PALETTE = 65_536;
 
-/** Reads and checks the `meta.json` of a SOG scene of version 1 (which does not say so) or 2. */
+/** Parses and validates the `meta.json` of a SOG scene of version 1 (which does not declare it) or 2. */
 export function parseSogMeta(source: JsonSource): SogMeta {
   const { name } = source;
   const json = parseJson(source, MAX_META_BYTES);
@@ -103,7 +106,7 @@ export function parseSogMeta(source: JsonSource): SogMeta {
       const values = ramp(min as number, max as number);
       return { degree: undefined, paletteSize: MAX_PALETTE, values, files: files('shN', 2) };
     }
-    // The width of the texture tells the degree where the file does not, as PlayCanvas has it.
+    // If the file does not declare the degree, the width of the texture determines it, as in PlayCanvas.
     const { bands, count: paletteSize = MAX_PALETTE } = shN;
     if (bands === 0) return undefined;
     if (bands !== undefined && bands !== 1 && bands !== 2 && bands !== 3) return fail('shN.bands', '1, 2 or 3', bands);
@@ -115,8 +118,8 @@ export function parseSogMeta(source: JsonSource): SogMeta {
 }
 
 /**
- * A codebook whose first entry is null, as early tools wrote it, and nothing else is amiss: that entry is taken to be one mean step below the second, which is what
- * PlayCanvas shows. Undefined for all others.
+ * A codebook of early tools whose first entry is null: that entry is taken to be one mean step below the second, as
+ * PlayCanvas does. Undefined for all others.
  */
 function withFirst(codebook: unknown): number[] | undefined {
   if (!Array.isArray(codebook) || codebook.length < 2 || codebook[0] !== null) return undefined;
@@ -138,7 +141,7 @@ function repeated(table: Float32Array, channels: number): Float32Array[] {
   return Array.from({ length: channels }, () => table);
 }
 
-/** The folder of gsplat's PNG compression, of which SOG came: its description names no files. */
+/** The folder of gsplat's PNG compression, the predecessor of SOG: its description names no files. */
 function gsplatPngs(name: string): GaussianSplatError {
   return new GaussianSplatError('decode/unsupported', {
     where: name,

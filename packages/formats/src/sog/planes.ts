@@ -7,15 +7,15 @@ import { WebpError } from '../webp/bits.js';
 import { decodeWebp, webpSize, type WebpImage } from '../webp/decode.js';
 import { decodeNatively } from '../webp/native.js';
 
-/** Pixels that a plane may have beyond one for each splat: rows and columns that only fill a rectangle. */
+/** Maximum number of pixels of a plane beyond one for each splat: rows and columns of padding. */
 const SPARE_PIXELS = 65_536;
 
-/** Opens the images of a SOG scene and decodes them, with bounds on what they may take. */
+/** Opens the images of a SOG scene and decodes them, with limits on their size. */
 export class Planes {
   readonly #open: OpenPart;
   readonly #source: SceneSource;
   readonly #loaded = new Map<string, Promise<Uint8Array>>();
-  /** The image decoded last: names may repeat. */
+  /** The last decoded image, because names may repeat. */
   #last: { readonly file: string; readonly image: WebpImage } | undefined;
 
   constructor(open: OpenPart, source: SceneSource) {
@@ -23,7 +23,7 @@ export class Planes {
     this.#source = source;
   }
 
-  /** Downloads an image: each once, however often it is named. */
+  /** Downloads an image: only once for repeated names. */
   load(file: string): Promise<Uint8Array> {
     const loading = this.#loaded.get(file) ?? this.#load(file);
     this.#loaded.set(file, loading);
@@ -48,7 +48,7 @@ export class Planes {
     return pixels;
   }
 
-  /** Any image of at most `maxPixels`; its header is asked before anything is allocated. */
+  /** Any image of at most `maxPixels`; its header is checked before anything is allocated. */
   async decode(bytes: Uint8Array, file: string, maxPixels: number): Promise<WebpImage> {
     const { signal, name, budget } = this.#source;
     signal?.throwIfAborted();
@@ -60,7 +60,7 @@ export class Planes {
       if (width * height > maxPixels) {
         throw damaged(where, `at most ${grouped(maxPixels)} pixels`, `${width} x ${height}`);
       }
-      // Pixels, and those before a transform of their own size is undone.
+      // Pixels, and those before a transform with its own size is inverted.
       take(8 * width * height);
       const image = (await decodeNatively(bytes, { width, height })) ?? decodeWebp(bytes, take);
       this.#last = { file, image };

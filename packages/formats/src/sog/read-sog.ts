@@ -19,8 +19,8 @@ import {
 } from './unpack.js';
 
 /**
- * Splats that one byte of the images may stand for. Images of a single colour have no bytes at all, so that a file of 200 bytes
- * could announce a thousand million splats; real scenes need 3 bytes and more for each.
+ * Maximum number of splats for each byte of the images. Images of a single color have almost no bytes, so that a file
+ * of 200 bytes could declare a thousand million splats; real scenes need at least 3 bytes for each.
  */
 const MAX_SPLATS_PER_BYTE = 16;
 const FREE_SPLATS = 65_536;
@@ -40,7 +40,7 @@ export async function readSogImages(meta: SogMeta, open: OpenPart, source: Scene
   const { name } = source;
   const images = new Planes(open, source);
   const { count } = meta;
-  // On their way early, but decoded only after what a preview needs.
+  // Download starts early, but they are decoded only after the images of a preview.
   const harmonics = meta.shN?.files.slice(0, 2).map((file) => images.load(file));
   // The other images are awaited first, and may fail first.
   harmonics?.forEach((file) => file.catch(() => undefined));
@@ -56,7 +56,10 @@ export async function readSogImages(meta: SogMeta, open: OpenPart, source: Scene
   return cloud;
 }
 
-/** Reads one SOG of a streamed scene: its `meta.json`, or a bundle of all of its files. @param open finds files beside it */
+/**
+ * Reads one SOG of a streamed scene: its `meta.json`, or a bundle of all of its files. @param open Opens files relative
+ * to it.
+ */
 export async function readSogPart(source: SceneSource, open: OpenPart): Promise<GaussianCloud> {
   if (startsWith(source.bytes, 'PK\x03\x04')) {
     const { openBundle } = await loadModule('the code that reads bundles', () => import('../zip/bundle.js'));
@@ -66,7 +69,7 @@ export async function readSogPart(source: SceneSource, open: OpenPart): Promise<
   return readSogImages(parseSogMeta(source), open, source);
 }
 
-/** The images without which there is nothing to see, all downloaded before the first is decoded. */
+/** The images required for a preview, all downloaded before the first is decoded. */
 async function decodeGeometry(images: Planes, meta: SogMeta, name: string): Promise<GeometryPlanes> {
   const files = [...meta.means.files.slice(0, 2), meta.scales.files[0], meta.quats.files[0], meta.sh0.files[0]];
   const loaded = await Promise.all(files.map((file) => images.load(file)));
@@ -107,7 +110,7 @@ function unpackGeometry(
   return cloud;
 }
 
-/** The degree, which version 1 tells by the palette's width alone. */
+/** The degree, which version 1 defines by the palette's width only. */
 function checkDegree({ shN }: SogMeta, width: number, name: string): ShDegree {
   const found = DEGREE_OF_REST_COUNT.get(width / PALETTE_ROW);
   const expected = shN?.degree ?? found;

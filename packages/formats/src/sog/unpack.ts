@@ -2,7 +2,7 @@ import { shCoefficientCount } from '@gaussian-splat/core';
 import { expInPlace, type DraftCloud } from '../cloud.js';
 import type { SogMeta } from './meta.js';
 
-/** Which splats are unpacked: every `step`-th, `count` of them. */
+/** Selection of splats to unpack: every `step`-th, `count` of them. */
 export interface Selection {
   readonly count: number;
   readonly step: number;
@@ -31,12 +31,12 @@ export function unpackMeans(
   }
 }
 
-/** Alpha 252 to 255 says which of (w, x, y, z) is the largest and left out; the others are bytes in ±1/sqrt(2). */
+/** Alpha 252 to 255 selects the largest of (w, x, y, z), which is not stored; the others are bytes in ±1/sqrt(2). */
 export function unpackQuats(plane: Uint32Array, { count, step }: Selection, out: Float32Array): void {
   for (let i = 0; i < count; i++) {
     const pixel = plane[i * step];
     const largest = alpha(pixel) - 252;
-    // Zeros: a rotation that no reader can know is left out as unusable.
+    // Leaves zeros: an undefined rotation makes the splat unusable.
     if (largest < 0) continue;
     let squares = 0;
     for (let component = 0, shift = 16; component < 4; component++) {
@@ -93,7 +93,7 @@ export interface Palette {
 /** Entries of the palette in one row of its image. */
 export const PALETTE_ROW = 64;
 
-/** Copies each splat's entry of the palette. Labels beyond the palette leave zeros. */
+/** Copies each splat's palette entry. Labels beyond the palette leave zeros. */
 export function unpackHarmonics(labels: Uint32Array, palette: Palette, cloud: DraftCloud): void {
   const coefficients = shCoefficientCount(cloud.shDegree) - 1;
   const entry = 3 * coefficients;

@@ -3,14 +3,14 @@ import { viewOf } from '../bytes.js';
 /** Bytes of one splat of a `.splat` file. */
 export const SPLAT_BYTES = 32;
 
-/** Records looked at, spread evenly over the file. */
+/** Number of sampled records, evenly spaced over the file. */
 const SAMPLES = 64;
 
 /**
- * Tells whether bytes look like a `.splat` file, which has no signature: positions are finite and no farther than 1e6,
- * standard deviations are from 0 to 1e4 and not all zero, and quaternions have a length near 1. `all` asks this of
- * every sampled record, as needed where nothing else speaks for the format; `at least half` only refuses what cannot
- * be meant, and leaves quaternions aside.
+ * Whether bytes look like a `.splat` file, which has no signature: positions are finite and no farther than 1e6,
+ * standard deviations are from 0 to 1e4 and not all zero, and quaternions have a length near 1. `all` requires this of
+ * every sampled record, if nothing else indicates the format; `at least half` only rejects implausible files, and
+ * ignores quaternions.
  */
 export function looksLikeSplats(bytes: Uint8Array, share: 'all' | 'at least half'): boolean {
   const count = Math.floor(bytes.length / SPLAT_BYTES);
@@ -28,7 +28,7 @@ function hasPlausibleFloats(view: DataView, at: number): boolean {
   const floats = [0, 1, 2, 3, 4, 5].map((k) => view.getFloat32(at + 4 * k, true));
   const positions = floats.slice(0, 3);
   const scales = floats.slice(3);
-  // Negated comparisons so that NaN fails.
+  // Comparisons are negated so that NaN fails.
   return (
     positions.every((p) => Math.abs(p) <= 1e6) && scales.every((s) => s >= 0 && s <= 1e4) && scales.some((s) => s > 0)
   );

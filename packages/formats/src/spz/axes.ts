@@ -2,36 +2,41 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
 import type { SpzHeader } from './header.js';
 
-/** Factor, 1 or -1, of each axis of a file on its way into a cloud's frame (x right, y down, z forward). */
+/** Sign of each axis in the conversion to the coordinates of a cloud (x right, y down, z forward). */
 export type AxisSigns = readonly [x: 1 | -1, y: 1 | -1, z: 1 | -1];
 
-/** x right, y up, z back: the frame that the specification names, and that Scaniverse and older tools write. */
+/** x right, y up, z back: the coordinates of the specification, which Scaniverse and older tools write. */
 export const RIGHT_UP_BACK: AxisSigns = [1, -1, -1];
-/** x right, y down, z forward: the frame of PLY, which current converters keep. */
+/** x right, y down, z forward: the coordinates of PLY, which current converters keep. */
 export const RIGHT_DOWN_FORWARD: AxisSigns = [1, 1, 1];
 
-/** Adobe's record of the frame a file is in, one of 16 in the numbering of SPZ's `CoordinateSystem`. */
+/** Adobe's record of the coordinate system of a file, one of 16 in the numbering of SPZ's `CoordinateSystem`. */
 const COORDINATE_SYSTEM = 0xadbe0003;
-/** Padding; and Adobe's limits of an orbiting camera, which change no splat. */
+/** Padding; and Adobe's limits of an orbiting camera, which do not affect splats. */
 const MEANINGLESS = new Set([0, 0xadbe0002]);
-/** Our own record of the order of splats: 1 for pixel by pixel. */
+/** Our own record of the order of splats: 1 for per-pixel. */
 const ORDER = 0x47530001;
 const MOST_SKIPPED = 8;
-/** Bits after the point that all converters write. */
+/** Number of fractional bits in the files of all converters. */
 const USUAL_FRACTIONAL_BITS = 12;
 
-/** The frame of a file: signs of its axes and, for systems whose third axis is vertical, the map [3, 4] that is applied afterwards. */
+/**
+ * Coordinate system of a file: signs of its axes and, for systems with a vertical third axis, a map [3, 4] to apply
+ * afterwards.
+ */
 export interface SpzFrame {
   readonly axes: AxisSigns;
   readonly turn?: readonly number[] | undefined;
-  /** The file names no frame. */
+  /** Whether the file declares no coordinate system. */
   readonly isAssumed?: boolean | undefined;
   readonly order?: 'pixel' | undefined;
 }
 
 /**
- * The frame of a file that names none, by its writer's marks. Version 1, and version 2 with antialiasing, come from Niantic's own apps; other numbers of fractional bits than 12
- * come from tools that follow the specification. All of these are in right-up-back. Current converters keep the frame of PLY: docs/decisions/0022-the-frame-of-spz.md.
+ * Axes of a file without a declared coordinate system, inferred from its writer. Version 1, and version 2 with
+ * antialiasing, come from Niantic's own apps; other numbers of fractional bits than 12 come from tools that follow the
+ * specification. All of these use right-up-back. Current converters keep the coordinates of PLY:
+ * docs/decisions/0022-the-frame-of-spz.md.
  */
 export function assumedAxes(header: SpzHeader): AxisSigns {
   const { version, antialiased, fractionalBits, followsSpecification } = header;
@@ -41,8 +46,8 @@ export function assumedAxes(header: SpzHeader): AxisSigns {
 }
 
 /**
- * Finds the frame that extension records name: `[uint32 type][uint32 length][payload]`, one after another; without one, {@link assumedAxes}. Records of
- * other types are skipped, and listed.
+ * Finds the coordinate system in the extension records: `[uint32 type][uint32 length][payload]`, in sequence; without
+ * one, {@link assumedAxes}. Records of other types are skipped, and listed.
  */
 export function readExtensions(
   records: Uint8Array,
@@ -70,8 +75,8 @@ export function readExtensions(
 }
 
 /**
- * Of systems 1 to 8, bit 0 of (system - 1) means right, bit 1 up and bit 2 forward. Systems 9 to 16 list the second axis of depth before the vertical one:
- * bit 0 of (system - 9) means right, bit 1 up and bit 2 back. System 0 is unspecified.
+ * In systems 1 to 8, bit 0 of (system - 1) means right, bit 1 up and bit 2 forward. Systems 9 to 16 list the depth axis
+ * before the vertical one: bit 0 of (system - 9) means right, bit 1 up and bit 2 back. System 0 is unspecified.
  */
 function frameOfSystem(system: number, name: string): SpzFrame | undefined {
   if (system === 0) return undefined;
@@ -91,16 +96,16 @@ function frameOfSystem(system: number, name: string): SpzFrame | undefined {
 }
 
 /**
- * Factors of the components x, y and z of a quaternion (w is not changed): a mirrored axis turns the sense of the
- * rotations about the other two.
+ * Signs of the components x, y and z of a quaternion (w does not change): a mirrored axis reverses the rotations about
+ * the other two.
  */
 export function quaternionSigns([x, y, z]: AxisSigns): readonly [number, number, number] {
   return [y * z, x * z, x * y];
 }
 
 /**
- * Factors of the 15 coefficients of spherical harmonics of degrees 1 to 3: the sign that x, y and z give to the
- * polynomial of each, in the order of 3D Gaussian Splatting.
+ * Signs of the 15 coefficients of spherical harmonics of degrees 1 to 3: that of each basis polynomial under the signs
+ * of x, y and z, in the order of 3D Gaussian Splatting.
  */
 export function harmonicSigns([x, y, z]: AxisSigns): readonly number[] {
   const degree1 = [y, z, x];

@@ -2,16 +2,16 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { GrowingBytes, grouped } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
 
-/** Compressed bytes handed over at once: what they can inflate to, at most 17 MB, may arrive before anyone can stop. */
+/** Compressed bytes fed in one step: they may inflate to 17 MB before the stream can be stopped. */
 const FEED_BYTES = 16_384;
 
 /**
- * True of the error for bytes behind the end of the stream, which other readers of SPZ leave alone: padding, for one. All that is in the stream has come by then. Browsers tell
- * it in words only, each in its own.
+ * Whether the error is about bytes after the end of the stream, such as padding, which other readers of SPZ ignore. The
+ * complete stream has been received then. Browsers report it only in the message, each differently.
  */
 const isBehind = (cause: unknown): boolean => /junk|extra bytes|after the end/i.test(String((cause as Error).message));
 
-/** Inflates a gzip file step by step, so that a header can be checked before its body is inflated. */
+/** Inflates a gzip file in steps, so that a header can be checked before its body is inflated. */
 export class Gunzip {
   readonly #source: SceneSource;
   readonly #reader: ReadableStreamDefaultReader<Uint8Array>;
@@ -22,14 +22,17 @@ export class Gunzip {
     this.#source = source;
     const { readable, writable } = new DecompressionStream('gzip');
     this.#reader = readable.getReader();
-    // Errors of the stream reach us through the reader.
+    // Errors of the stream are reported by the reader.
     this.#feed(writable.getWriter()).catch(() => {});
   }
 
-  /** Inflates on until there are `length` bytes or the stream ends; returns all bytes so far, maybe more than asked. Throws `out-of-memory/budget` where the load may not take as many. */
+  /**
+   * Inflates until there are `length` bytes or the stream ends; returns all inflated bytes, possibly more. Throws
+   * `out-of-memory/budget` if the load may not allocate as many.
+   */
   async upTo(length: number): Promise<Uint8Array> {
     const { budget, name } = this.#source;
-    // What grows is there twice while it is copied.
+    // A growing buffer exists twice while it is copied.
     budget.take(2 * length, name);
     while (this.#output.length < length && !this.#isEnded) {
       this.#source.signal?.throwIfAborted();
@@ -58,7 +61,7 @@ export class Gunzip {
 
   #fail(cause: unknown): never {
     const { name, bytes } = this.#source;
-    // Browsers name the two cases in words only.
+    // Browsers distinguish the two cases only in the message.
     const isCut = /unexpected end|truncated|incomplete|ended/i.test(String((cause as Error).message));
     throw new GaussianSplatError(isCut ? 'decode/truncated' : 'decode/corrupt', {
       where: `${name}, ${isCut ? `byte ${grouped(bytes.length)} (end of the file)` : 'gzip stream'}`,

@@ -1,17 +1,17 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped, startsWith, viewOf } from '../bytes.js';
 
-/** What the headers of all versions of SPZ say. */
+/** Common header fields of all versions of SPZ. */
 export interface SpzHeader {
   readonly version: 1 | 2 | 3 | 4;
   /** Number of splats. */
   readonly count: number;
   readonly degree: ShDegree | 4;
-  /** Bits after the point of the 24-bit coordinates. */
+  /** Number of fractional bits of the 24-bit coordinates. */
   readonly fractionalBits: number;
   readonly antialiased: boolean;
   readonly hasExtensions: boolean;
-  /** The file is known to be in the frame of the specification unless it names another. */
+  /** Whether the file uses the coordinates of the specification unless it declares others. */
   readonly followsSpecification?: boolean | undefined;
 }
 
@@ -19,15 +19,15 @@ export interface SpzHeader {
 export const SPZ_ATTRIBUTES = ['positions', 'opacities', 'colours', 'scales', 'rotations', 'harmonics'] as const;
 export type SpzAttribute = (typeof SPZ_ATTRIBUTES)[number];
 
-/** Bytes of the header of versions 1 to 3, and of the part that version 4 shares with them. */
+/** Length of the header of versions 1 to 3, and of the part that version 4 shares with them. */
 export const SPZ_HEADER_BYTES = 16;
 
 const FLAG_ANTIALIASED = 1;
 const FLAG_EXTENSIONS = 2;
-/** Spark's marker of a tree of levels of detail: the splats of all levels follow, and drawing all would be wrong. */
+/** Spark's flag for a tree of levels of detail: the splats of all levels follow, and drawing all would be wrong. */
 const FLAG_LEVEL_OF_DETAIL = 0x80;
 
-/** Deflate cannot compress better than this, and no real scene of zstd streams does. */
+/** Maximum ratio of deflate, which real scenes in zstd streams do not exceed either. */
 const MAX_COMPRESSION_RATIO = 1032;
 
 /** Reads and checks the first 16 bytes of an SPZ file (after decompression, for gzip files). */
@@ -79,7 +79,7 @@ export function bodyBytes({ count, degree }: SpzHeader, version: number): number
   return count * Object.values(bytesPerSplat(version, degree)).reduce((sum, size) => sum + size, 0);
 }
 
-/** Refuses headers that announce more splats than a file of this size can hold, before anything is allocated. */
+/** Rejects headers that declare more splats than a file of this size can hold, before anything is allocated. */
 export function requirePlausibleCount(header: SpzHeader, fileBytes: number, name: string): void {
   if (header.count === 0) {
     throw new GaussianSplatError('decode/empty', {

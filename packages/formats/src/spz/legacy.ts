@@ -11,24 +11,25 @@ import {
 } from './header.js';
 import type { PackedScene } from './streams.js';
 
-/** Extension records, which have 12 to 20 bytes each, and padding after the splats are read up to this size. */
+/** Limit for extension records, which have 12 to 20 bytes each, and padding after the splats. */
 const MAX_TRAILING_BYTES = 65_536;
 
 const VERSIONS = [1, 2, 3];
 
 /**
- * Most bytes that a body can have under this header in any version, what follows it and one byte too many included: what
- * must be inflated to tell a wrong version from a wrong length.
+ * Maximum length of a body under this header in any version, including trailing bytes and one byte too many: this much
+ * must be inflated to distinguish a wrong version from a wrong length.
  */
 export function longestBody(header: SpzHeader): number {
   return Math.max(...VERSIONS.map((version) => bodyBytes(header, version))) + MAX_TRAILING_BYTES + 1;
 }
 
 /**
- * Reads the body of versions 1 to 3: the attributes of all splats, one after another, then extension records. What else
- * follows is left alone where it cannot be the rest of a body of another version than the header names, which would show garbage.
+ * Reads the body of versions 1 to 3: the attributes of all splats in sequence, then extension records. Other trailing
+ * bytes are ignored unless they may belong to a body of another version than the header declares, which would decode to
+ * garbage.
  *
- * @param file the inflated file, or as much as {@link longestBody} asks for.
+ * @param file The inflated file, or as much as {@link longestBody} requires.
  */
 export function readLegacyBody(file: Uint8Array, header: SpzHeader, name: string): PackedScene {
   const expected = bodyBytes(header, header.version);
@@ -46,7 +47,7 @@ export function readLegacyBody(file: Uint8Array, header: SpzHeader, name: string
   return { attributes, ...readExtensions(header.hasExtensions ? file.subarray(at) : new Uint8Array(0), header, name) };
 }
 
-/** True of what may stand behind a body: zeros, or fewer bytes than another version would have there. */
+/** Whether bytes are valid after a body: zeros, or fewer than another version would have there. */
 function isTrailing(rest: Uint8Array, header: SpzHeader): boolean {
   const own = bodyBytes(header, header.version);
   const others = VERSIONS.map((version) => bodyBytes(header, version) - own).filter((bytes) => bytes > 0);

@@ -6,10 +6,10 @@ import { decompressZstd } from '../zstd/decompress.js';
 import { readExtensions, type SpzFrame } from './axes.js';
 import { bytesPerSplat, SPZ_ATTRIBUTES, truncatedHeader, type SpzAttribute, type SpzHeader } from './header.js';
 
-/** The packed attributes of all splats, and the frame that they are in. */
+/** The packed attributes of all splats, and their coordinate system. */
 export interface PackedScene extends SpzFrame {
   readonly attributes: Readonly<Record<SpzAttribute, Uint8Array>>;
-  /** Types of extensions that are not known. */
+  /** Types of unknown extensions. */
   readonly skipped?: readonly number[];
 }
 

@@ -7,10 +7,10 @@ import { bytesPerSplat, type SpzHeader } from './header.js';
 import type { SceneSource } from '../scene-format.js';
 import type { PackedScene } from './streams.js';
 
-/** Colours are stored as 0.5 + 0.15·f_dc, which leaves room for constant terms outside 0..1. */
+/** Colors are stored as 0.5 + 0.15·f_dc, which allows constant terms outside 0..1. */
 const COLOUR_SCALE = 0.15;
 
-/** Unpacks all attributes into a cloud (the definition is `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
+/** Unpacks all attributes into a cloud (defined by `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
 export function unpackSplats(
   header: SpzHeader,
   { attributes, axes, isAssumed, order, skipped = [] }: PackedScene,
@@ -65,8 +65,8 @@ function unpackFirstThree(packed: Uint8Array, axes: AxisSigns, out: Float32Array
 }
 
 /**
- * Versions 3 and 4: two bits for the largest component of (x, y, z, w), which is left out, then a sign bit and 9 bits
- * of magnitude up to 1/sqrt(2) for each other.
+ * Versions 3 and 4: two bits for the largest component of (x, y, z, w), which is not stored, then a sign bit and 9 bits
+ * of magnitude up to 1/sqrt(2) for each of the others.
  */
 function unpackSmallestThree(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
   const signs = [...quaternionSigns(axes), 1];
@@ -87,7 +87,7 @@ function unpackSmallestThree(packed: Uint8Array, axes: AxisSigns, out: Float32Ar
   }
 }
 
-/** Coefficients -1..1 in bytes, channels side by side as in a cloud. */
+/** Coefficients -1..1 in bytes, channels interleaved as in a cloud. */
 function unpackHarmonics(
   packed: Uint8Array,
   { version, degree, count }: SpzHeader,

@@ -1,15 +1,19 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { transformCloud } from './transform-cloud.js';
 
-/** Splats by which the middle of a cloud is found. */
+/** Number of splats sampled for the center of a cloud. */
 const SAMPLES = 4096;
 
-/** True if a map moves so far, as those of georeferenced scenes do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
+/**
+ * Whether float32 would round positions by more than a few hundredths of a millimeter after the translation of a map,
+ * as in georeferenced scenes.
+ */
 export const isFar = (map: readonly number[]): boolean => [3, 7, 11].some((k) => Math.abs(map[k]) >= 1_000);
 
 /**
- * A cloud moved by an affine map, in place. Far from (0, 0, 0) the middle of its splats becomes the origin, so that they keep their digits.
- * @param map [3, 4], row by row: linear part and translation
+ * Applies an affine map to a cloud, in place. Far from (0, 0, 0) the center of its splats becomes the origin, so that
+ * they keep their precision.
+ * @param map [3, 4], row-major: linear part and translation.
  */
 export function movedCloud(cloud: GaussianCloud, map: readonly number[]): GaussianCloud {
   const { origin } = cloud;
@@ -22,7 +26,7 @@ export function movedCloud(cloud: GaussianCloud, map: readonly number[]): Gaussi
     map[row] * from[0] + map[row + 1] * from[1] + map[row + 2] * from[2] + map[row + 3];
   const world = local.map((x, axis) => x + origin[axis]);
   const moved = [place(world, 0), place(world, 4), place(world, 8)] as const;
-  // The middle comes to lie at (0, 0, 0).
+  // The center moves to (0, 0, 0).
   const shift = [0, 4, 8].map((row) => map[row + 3] - place(local, row));
   transformCloud(
     cloud,
@@ -31,7 +35,7 @@ export function movedCloud(cloud: GaussianCloud, map: readonly number[]): Gaussi
   return { ...cloud, origin: moved };
 }
 
-/** Median of some of the coordinates along an axis: one that cannot be drawn may be anywhere. */
+/** Median of sampled coordinates along an axis, because unusable ones may have any value. */
 function middleOf({ positions, count }: GaussianCloud, axis: number): number {
   const step = 3 * Math.ceil(count / SAMPLES);
   const sample: number[] = [];

@@ -22,7 +22,10 @@ const BANDS: readonly ((x: number, y: number, z: number) => number[])[] = [
   },
 ];
 
-/** Directions in which the harmonics are compared: a spiral over the sphere, more of them than there are coefficients. */
+/**
+ * The harmonics are compared at these directions: a spiral over the sphere, with more points than there are
+ * coefficients.
+ */
 const DIRECTIONS = Array.from({ length: 24 }, (_, k) => {
   const z = 1 - (2 * k + 1) / 24;
   const angle = k * Math.PI * (3 - Math.sqrt(5));
@@ -31,9 +34,9 @@ const DIRECTIONS = Array.from({ length: 24 }, (_, k) => {
 });
 
 /**
- * How the coefficients of a band change when what they describe is turned by an orthogonal matrix, a reflection included:
- * [2b + 1, 2b + 1], row by row. Found by asking that the turned function, in every direction d, be the old one in the
- * direction that was turned into d.
+ * Matrix that transforms the coefficients of a band under an orthogonal matrix, including reflections: [2b + 1, 2b +
+ * 1], row-major. It solves for the rotated function to equal, in every direction d, the original one in the direction
+ * that rotates to d.
  *
  * @param band 1, 2 or 3.
  */

@@ -12,17 +12,18 @@ import {
 } from '@gaussian-splat/core';
 import { shRotation } from './sh-rotation.js';
 
-/** Relative difference from a rotation with one scale up to which a matrix counts as one. */
+/** Relative tolerance within which a matrix counts as a rotation with uniform scale. */
 const SIMILARITY = 1e-6;
 
-/** Entry of a rotation of harmonics that float32 would not show. */
+/** Entries of a rotation of harmonics below this vanish in float32. */
 const NEGLIGIBLE = 1e-12;
 
 /**
- * Moves a cloud by an affine map, in place: centres, covariances, and the directions of the spherical harmonics, which turn with the
- * map's rotation. Maps that flatten splats make discs of them; those that leave no more than a line or a point leave splats without extent, which readers drop.
+ * Applies an affine map to a cloud, in place: centers, covariances, and the directions of the spherical harmonics,
+ * which rotate with the map. Maps that flatten splats give discs; those that leave only a line or a point give splats
+ * without extent, which readers drop.
  *
- * @param map [3, 4], row by row: linear part and translation.
+ * @param map [3, 4], row-major: linear part and translation.
  */
 export function transformCloud(cloud: GaussianCloud, map: readonly number[]): void {
   const linear = [map[0], map[1], map[2], map[4], map[5], map[6], map[8], map[9], map[10]];
@@ -41,8 +42,9 @@ export function transformCloud(cloud: GaussianCloud, map: readonly number[]): vo
 }
 
 /**
- * The map, or for one that flattens another that turns alike and does not: its cofactors are the product of the axis that is lost and the one that nothing comes to lie
- * along, as long as the product of the two scales that are left. Undefined where less than a plane is left.
+ * Returns the map, or for a singular one of rank 2 a regular one with the same rotation: its cofactors are the outer
+ * product of the lost axis and the normal of the image plane, scaled by the product of the two remaining scales.
+ * Undefined for lower ranks.
  */
 function filled(m: Matrix3): Matrix3 | undefined {
   const volume = determinant(m);
@@ -68,7 +70,9 @@ function movePositions(positions: Float32Array, m: Matrix3, [tx, ty, tz]: readon
   }
 }
 
-/** A mirrored ellipsoid is a turned one: -1 times a reflection is a rotation, and an ellipsoid is its own mirror image in its centre. */
+/**
+ * A mirrored ellipsoid equals a rotated one: -1 times a reflection is a rotation, and an ellipsoid is point-symmetric.
+ */
 function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, scale: number): void {
   const sign = Math.sign(determinant(turn));
   const [w, x, y, z] = quaternionOfMatrix(turn.map((value) => sign * value));
@@ -85,7 +89,7 @@ function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, 
   if (scale !== 1) for (let k = 0; k < scales.length; k++) scales[k] *= scale;
 }
 
-/** Covariances M·Σ·Mᵀ, taken apart into rotation and scales again. */
+/** Covariances M·Σ·Mᵀ, decomposed into rotation and scales again. */
 function deformShapes({ count, scales, rotations }: GaussianCloud, m: Matrix3): void {
   for (let i = 0; i < count; i++) {
     const q = rotations.subarray(4 * i, 4 * i + 4);
@@ -108,7 +112,7 @@ function turnHarmonics(cloud: GaussianCloud, turn: Matrix3): void {
   bands.forEach((band, k) => turnBand(cloud, band, rotations[k]));
 }
 
-/** The diagonal of a rotation of harmonics that does no more than change signs, as half turns do. */
+/** Diagonal of a rotation of harmonics that only changes signs, as for half turns. */
 function signsOf(matrix: Float64Array, size: number): number[] | undefined {
   const diagonal = Array.from({ length: size }, (_, k) => Math.sign(matrix[k * size + k]));
   const isDiagonal = matrix.every((value, at) => {
@@ -129,7 +133,7 @@ function turnBand({ count, sh, shDegree }: GaussianCloud, band: number, matrix: 
   const stride = 3 * shCoefficientCount(shDegree);
   const old = new Float64Array(21);
   const size = 2 * band + 1;
-  // Quarter turns between files' axes leave a number or two a row.
+  // Quarter turns between axis conventions leave one or two entries in each row.
   const terms = Array.from({ length: size }, (_, row) =>
     Array.from({ length: size }, (_, k) => ({ k, factor: matrix[row * size + k] })).filter(
       ({ factor }) => Math.abs(factor) > NEGLIGIBLE,

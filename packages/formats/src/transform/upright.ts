@@ -1,23 +1,26 @@
-/** Turning clouds so that up is where formats without a place for it have it. */
+/** Rotates clouds so that up matches the convention of formats without such metadata. */
 import { type GaussianCloud, type Matrix3, type Vector3 } from '@gaussian-splat/core';
 import { transformCloud } from './transform-cloud.js';
 
-/** Cosine of the angle to straight down from which on any axis of a half turn does. */
+/** Cosine of the angle to straight down beyond which any half-turn axis is valid. */
 const OPPOSITE = -1 + 1e-9;
 
-/** The rotation, row by row, that brings the up of a cloud's hints to (0, -1, 0); undefined if it is there, or unknown. */
+/**
+ * Returns the rotation, row-major, of the up direction of a cloud's hints to (0, -1, 0); undefined if it is already
+ * there, or unknown.
+ */
 export function uprightRotation({ hints }: Pick<GaussianCloud, 'hints'>): Matrix3 | undefined {
   const up = hints?.up;
   if (up === undefined || (up[1] === -1 && up[0] === 0 && up[2] === 0)) return undefined;
   const cosine = -up[1];
   if (cosine < OPPOSITE) return [1, 0, 0, 0, -1, 0, 0, 0, -1];
-  // Rodrigues' formula for the axis up × (0, -1, 0), which has no y.
+  // Rodrigues' formula for the axis up × (0, -1, 0), which has no y component.
   const [x, z] = [up[2], -up[0]];
   const share = 1 / (1 + cosine);
   return [1 - z * z * share, -z, x * z * share, z, cosine, -x, x * z * share, x, 1 - x * x * share];
 }
 
-/** A copy of a cloud, turned about (0, 0, 0) of the world by a rotation given row by row. */
+/** Returns a copy of a cloud, rotated about the world origin by a row-major rotation. */
 export function turned(cloud: GaussianCloud, rotation: Matrix3): GaussianCloud {
   const { origin, positions, scales, rotations, opacities, sh } = cloud;
   const row = (k: number): number =>
@@ -33,7 +36,7 @@ export function turned(cloud: GaussianCloud, rotation: Matrix3): GaussianCloud {
   return copy;
 }
 
-/** A cloud whose up is (0, -1, 0): the same one, or a turned copy without `hints.up`. */
+/** Returns a cloud with the up direction (0, -1, 0): the same one, or a rotated copy without `hints.up`. */
 export function upright(cloud: GaussianCloud): GaussianCloud {
   const rotation = uprightRotation(cloud);
   if (rotation === undefined) return cloud;

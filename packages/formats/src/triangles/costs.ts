@@ -1,17 +1,17 @@
 import type { Json } from '../gltf/container.js';
 import type { GltfDocument } from '../gltf/document.js';
 
-/** Charged for each draw of a primitive and for each material: shader nodes, bindings and uniforms of three.js. */
+/** Charge for each draw of a primitive and for each material: shader nodes, bindings and uniforms of three.js. */
 export const DRAW_BYTES = 2 ** 17;
-/** Charged for each triangle that a frame draws: work, not memory. */
+/** Charge for each triangle of a frame: work, not memory. */
 export const TRIANGLE_BYTES = 16;
-/** Charged for each channel of an animation: tracks, interpolants and mixers of three.js. */
+/** Charge for each channel of an animation: tracks, interpolants and mixers of three.js. */
 export const CHANNEL_BYTES = 4096;
-/** Charged for each node that a channel may be compared with. */
+/** Charge for each node that may be compared with a channel. */
 export const STEP_BYTES = 8;
-/** Charged for each joint of each skinned mesh: a matrix, its inverse, and their copies on the GPU. */
+/** Charge for each joint of each skinned mesh: a matrix, its inverse, and their copies on the GPU. */
 export const JOINT_BYTES = 256;
-/** A texture with its mipmaps, bytes a pixel. */
+/** Bytes for each pixel of a texture with mipmaps. */
 export const TEXEL_BYTES = (4 * 4) / 3;
 
 const COMPONENT_BYTES: ReadonlyMap<unknown, number> = new Map([
@@ -32,7 +32,7 @@ const TYPE_WIDTHS: ReadonlyMap<unknown, number> = new Map([
   ['MAT4', 16],
 ]);
 
-/** The layout of an accessor, checked. */
+/** The validated layout of an accessor. */
 export interface AccessorLayout {
   readonly count: number;
   /** Bytes of one component. */
@@ -41,7 +41,7 @@ export interface AccessorLayout {
   readonly byteLength: number;
 }
 
-/** Checks the numbers of an accessor. Throws `decode/header`. */
+/** Validates the numbers of an accessor. Throws `decode/header`. */
 export function layoutOf(document: GltfDocument, index: unknown): AccessorLayout {
   const accessor = document.item('accessors', index);
   const path = `accessors[${String(index)}]`;
@@ -53,14 +53,14 @@ export function layoutOf(document: GltfDocument, index: unknown): AccessorLayout
   return { count, componentBytes, byteLength: count * width * componentBytes };
 }
 
-/** Primitives of a mesh that are no splats, each an object. Throws `decode/header`. */
+/** Returns the primitives of a mesh other than splats, each an object. Throws `decode/header`. */
 export function trianglesOf(document: GltfDocument, mesh: unknown, isSplats: (primitive: unknown) => boolean): Json[] {
   const { primitives } = document.item('meshes', mesh);
   if (!Array.isArray(primitives)) return document.fail(`meshes[${String(mesh)}].primitives`, 'a list', primitives);
   return primitives.filter((primitive) => !isSplats(primitive)) as Json[];
 }
 
-/** How many triangles a primitive draws; points and lines count as one each. */
+/** Number of triangles of a primitive; points and lines count as one each. */
 export function triangleCount(document: GltfDocument, { indices, attributes, mode = 4 }: Json): number {
   const { POSITION } = attributes as Json;
   const vertices = indices === undefined ? document.accessorCount(POSITION) : document.accessorCount(indices);

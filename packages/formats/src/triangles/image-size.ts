@@ -26,7 +26,7 @@ function pngHeader(bytes: Uint8Array): ImageHeader | undefined {
   return { type: 'image/png', width: view.getUint32(16), height: view.getUint32(20) };
 }
 
-/** Start-of-frame markers: C0 to CF without the tables (C4), the reserved one (C8) and arithmetic conditioning (CC). */
+/** Start-of-frame markers: C0 to CF except the tables (C4), the reserved one (C8) and arithmetic conditioning (CC). */
 const isFrame = (marker: number): boolean => marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker);
 
 function jpegHeader(bytes: Uint8Array): ImageHeader | undefined {

@@ -7,20 +7,20 @@ import { TEXEL_BYTES } from './costs.js';
 import { imageHeader, type ImageHeader } from './image-size.js';
 import type { Survey } from './survey.js';
 
-/** Pixels of a side that every WebGPU device has room for. */
+/** Texture size that every WebGPU device supports. */
 const MAX_SIDE = 8192;
 
-/** An image, undecoded. */
+/** An encoded image. */
 export interface ImageFile extends ImageHeader {
   readonly bytes: Uint8Array<ArrayBuffer>;
 }
 
-/** The images that the textures of used materials show. */
+/** The images in the textures of used materials. */
 export class Images {
-  /** GPU memory of all textures, bytes. Known once the images are read. */
+  /** GPU memory of all textures in bytes, known once the images are read. */
   byteLength = 0;
   readonly #document: GltfDocument;
-  /** By image: textures on the GPU that show it. */
+  /** GPU textures that contain each image. */
   readonly #uses = new Map<number, Set<string>>();
 
   /** Throws `decode/*`. */
@@ -31,7 +31,7 @@ export class Images {
         const image = sourceOf(document, reference.index);
         const uses = this.#uses.get(image) ?? new Set();
         this.#uses.set(image, uses);
-        // A transform or another set of coordinates makes a texture of its own.
+        // Another transform or set of coordinates requires a separate texture.
         uses.add(JSON.stringify([reference.index, reference.texCoord, reference.extensions]));
       }
     }
@@ -58,7 +58,7 @@ export class Images {
       throw damaged(`${document.name}, ${path}`, expected, `${width} x ${height}`, 'decode/unsupported');
     }
     const texture = Math.ceil(width * height * TEXEL_BYTES);
-    // The file, the bitmap, and each texture.
+    // Charges the file, the bitmap, and each texture.
     document.take(bytes.length + 4 * width * height + uses * texture);
     this.byteLength += uses * texture;
     return { ...header, bytes: bytes.slice() as Uint8Array<ArrayBuffer> };
@@ -71,7 +71,7 @@ export class Images {
   }
 }
 
-/** The image of a texture: WebP if there is one, because others are only for viewers that cannot read it. */
+/** The image of a texture: WebP if available, because others are fallbacks for viewers without WebP. */
 export function sourceOf(document: GltfDocument, index: unknown): number {
   const texture = document.item('textures', index);
   const { extensions, source } = texture;
@@ -87,7 +87,7 @@ export function sourceOf(document: GltfDocument, index: unknown): number {
   );
 }
 
-/** All references to textures in a material and in its extensions. */
+/** All texture references in a material and in its extensions. */
 function texturesIn(value: Json, depth = 0): Json[] {
   return Object.entries(value).flatMap(([key, child]) => {
     if (!isObject(child) || depth > 3) return [];

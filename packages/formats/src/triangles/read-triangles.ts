@@ -9,47 +9,47 @@ import { Survey } from './survey.js';
 import { trimmed } from './trim.js';
 import { Views, type MeshoptView } from './views.js';
 
-/** A file in memory, and the ways to the files that it names. */
+/** A file in memory, and access to the files that it names. */
 export interface TriangleSource {
   readonly bytes: Uint8Array;
-  /** What error messages call the file. */
+  /** Name in error messages. */
   readonly name: string;
   readonly budget: LoadBudget;
   /**
    * Fetches a file that the glTF names.
-   * @param uri as the glTF has it, relative or absolute; never `data:`
+   * @param uri As in the glTF, relative or absolute; never `data:`.
    */
   readonly openUri: OpenUri;
 }
 
-/** The triangles, points and lines of a file: JSON that names no file, and the bytes that it refers to. */
+/** The triangles, points and lines of a file: self-contained JSON, and its binary data. */
 export interface TriangleFile {
   /**
-   * glTF 2.0 with one scene, without splats, cameras, names and extras. Its buffer views have neither buffers nor offsets: their bytes are in `views`. Its images have neither
-   * addresses nor views: they are in `images`.
+   * glTF 2.0 with one scene, without splats, cameras, names and extras. Its buffer views have neither buffers nor
+   * offsets: their bytes are in `views`. Its images have neither addresses nor views: they are in `images`.
    */
   readonly json: Json;
-  /** Bytes of each buffer view that is used, each in a buffer of its own. */
+  /** Bytes of each used buffer view, each in its own buffer. */
   readonly views: readonly (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[];
-  /** Each image that is used, undecoded. */
+  /** Each used image, encoded. */
   readonly images: readonly (ImageFile | undefined)[];
   /** GPU memory of geometry and textures, bytes. */
   readonly byteLength: number;
   /** Triangles that a frame draws. */
   readonly triangles: number;
-  /** Sentences about the parts of the file that are not shown. */
+  /** Messages about the parts of the file that are not shown. */
   readonly warnings: readonly string[];
 }
 
-/** Extensions that a file may require. Draco and KTX2 are not among them. */
+/** Extensions that a file may require. Draco and KTX2 are not supported. */
 const KNOWN =
   /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_transform|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_xmp\w*)$/;
 
 /**
- * Reads the triangles of a glTF 2.0, GLB or PLY file. Every number that a viewer allocates by is checked, and all that the file announces or names again is charged to the budget, before
- * anything is decoded.
+ * Reads the triangles of a glTF 2.0, GLB or PLY file. Every number that determines an allocation is validated, and
+ * everything that the file declares or repeats is charged to the budget, before anything is decoded.
  *
- * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`, and the errors of `openUri`
+ * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`, and the errors of `openUri`.
  */
 export async function readTriangles(source: TriangleSource): Promise<TriangleFile> {
   const { bytes, name, budget, openUri } = source;

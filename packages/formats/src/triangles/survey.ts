@@ -16,24 +16,24 @@ import {
 
 const LIGHTS = 'KHR_lights_punctual';
 const INSTANCES = 'EXT_mesh_gpu_instancing';
-/** Lights that are shown: each pixel computes all of them. */
+/** Maximum number of lights, because each pixel evaluates all of them. */
 const MAX_LIGHTS = 16;
 
-/** The parts of a file that its scene uses, besides splats. All of them are charged to the budget. */
+/** The parts of a file that its scene uses, except splats. All of them are charged to the budget. */
 export class Survey {
   readonly nodes = new Set<number>();
   readonly meshes = new Set<number>();
   readonly materials = new Set<number>();
   readonly skins = new Set<number>();
   readonly accessors = new Set<number>();
-  /** Nodes whose light is shown. */
+  /** Nodes whose light is used. */
   readonly lit = new Set<number>();
-  /** Lights that are not shown. */
+  /** Number of lights that are not used. */
   darkLights = 0;
-  /** Primitives that a frame draws, and their triangles. */
+  /** Primitives drawn in a frame, and their triangles. */
   draws = 0;
   triangles = 0;
-  /** Bytes that copies of accessors take: morph targets, instances, joints. */
+  /** Bytes of accessor copies: morph targets, instances, joints. */
   copies = 0;
   readonly #document: GltfDocument;
   readonly #primitives = new Map<number, Json[]>();
@@ -47,7 +47,7 @@ export class Survey {
     for (const accessor of this.accessors) this.#addAccessor(accessor);
   }
 
-  /** Channels of an animation that move nodes of the scene. */
+  /** Channels of an animation that affect nodes of the scene. */
   channelsOf(animation: Json): Json[] {
     const channels: unknown[] = Array.isArray(animation.channels) ? animation.channels : [];
     const moves = (channel: unknown): channel is Json =>
@@ -55,7 +55,7 @@ export class Survey {
     return channels.filter(moves);
   }
 
-  /** Primitives of a mesh that are no splats. */
+  /** Primitives of a mesh other than splats. */
   primitivesOf(mesh: number): Json[] {
     const known = this.#primitives.get(mesh) ?? trianglesOf(this.#document, mesh, isSplats);
     this.#primitives.set(mesh, known);
@@ -117,11 +117,11 @@ export class Survey {
         this.#use(accessor);
       }
     }
-    // All targets of a primitive are one texture, which the page and the GPU have each.
+    // All morph targets of a primitive are one texture, in CPU and in GPU memory.
     this.#copy(2 * 16 * count * names.size * listOf(targets).length);
   }
 
-  /** Copies of a node's mesh. */
+  /** Instances of a node's mesh. */
   #instancesOf(extension: unknown, node: number): number {
     if (!isObject(extension)) return 1;
     const { attributes } = extension;
@@ -132,7 +132,7 @@ export class Survey {
       return this.#document.accessorCount(accessor);
     });
     const count = Math.max(1, ...counts);
-    // A matrix each, on the page and on the GPU.
+    // A matrix each, in CPU and in GPU memory.
     this.#copy(2 * 64 * count);
     return count;
   }
@@ -167,7 +167,7 @@ export class Survey {
     this.accessors.add(accessor as number);
   }
 
-  /** The page has it, and the GPU. */
+  /** Charged for the CPU and for the GPU. */
   #addAccessor(index: number): void {
     this.#document.take(2 * layoutOf(this.#document, index).byteLength);
   }

@@ -5,14 +5,17 @@ import { rootNodes } from '../gltf/nodes.js';
 import { sourceOf } from './images.js';
 import type { Survey } from './survey.js';
 
-/** Extensions that the loader of three.js reads here. */
+/** Extensions that the loader of three.js supports here. */
 const READ =
   /^(KHR_materials_\w+|EXT_materials_\w+|KHR_lights_punctual|KHR_texture_transform|KHR_mesh_quantization|EXT_mesh_gpu_instancing)$/;
 
-/** Characters of a name that are kept: it is copied for each channel of an animation. */
+/** Maximum length of a name, because it is copied for each channel of an animation. */
 const NAME_LENGTH = 64;
 
-/** The JSON of a glTF with nothing in it but what its scene uses. Of names, those of meshes and materials are kept, which picks tell. */
+/**
+ * Returns the JSON of a glTF reduced to the content that its scene uses. Names are kept only for meshes and materials,
+ * which picking reports.
+ */
 export function trimmed(document: GltfDocument, survey: Survey): Json {
   const { json } = document;
   const { meshes, materials, skins, accessors } = survey;
@@ -55,7 +58,10 @@ const nameOf = (name: unknown): string | undefined =>
 const hasSource = ({ source, extensions }: Json): boolean =>
   source !== undefined || (isObject(extensions) && isObject(extensions.EXT_texture_webp));
 
-/** Where it stands, and what of it is shown. Nodes beyond the scene may be named by skins: of these only the place is kept. */
+/**
+ * Transform of a node, and its visible content. Skins may refer to nodes outside the scene: only their transform is
+ * kept.
+ */
 function nodeOf(node: Json, index: number, { nodes, lit }: Survey): Json {
   const { matrix, translation, rotation, scale } = node;
   const place = { matrix, translation, rotation, scale };

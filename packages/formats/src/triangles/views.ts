@@ -19,7 +19,7 @@ export interface MeshoptView {
 const MODES = ['ATTRIBUTES', 'TRIANGLES', 'INDICES'];
 const FILTERS = ['NONE', 'OCTAHEDRAL', 'QUATERNION', 'EXPONENTIAL', 'COLOR'];
 
-/** The buffer views that accessors use, with every range checked. */
+/** The buffer views that accessors use, with every range validated. */
 export class Views {
   /** Bytes of the accessors on the GPU. */
   readonly byteLength: number;
@@ -34,7 +34,7 @@ export class Views {
     this.byteLength = bytes;
   }
 
-  /** Copies them out of their buffers. Throws `decode/*`, `out-of-memory/budget`, and what the fetching of buffers does. */
+  /** Copies the views from their buffers. Throws `decode/*`, `out-of-memory/budget`, and errors of fetching buffers. */
   async read(): Promise<(Uint8Array<ArrayBuffer> | MeshoptView | undefined)[]> {
     const { bufferViews } = this.#document.json;
     const views: (Uint8Array<ArrayBuffer> | MeshoptView | undefined)[] = new Array(
@@ -70,7 +70,9 @@ export class Views {
     };
   }
 
-  /** Checks that an accessor lies within its views. @returns its bytes on the GPU, those between its elements included */
+  /**
+   * Checks that an accessor lies within its views. @returns Its bytes on the GPU, including gaps between its elements.
+   */
   #check(index: number): number {
     const document = this.#document;
     const accessor = document.item('accessors', index);

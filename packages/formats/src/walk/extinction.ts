@@ -1,6 +1,6 @@
 import { GaussianSplatError, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 
-/** Rows of the rotation from the cloud's frame to a frame with y up. */
+/** Rows of the rotation from the coordinates of the cloud to those with y up. */
 export type UpFrame = readonly [Vector3, Vector3, Vector3];
 
 /** Cubic voxels: a frame with y up, lengths in meters. */
@@ -29,11 +29,11 @@ export interface GridOptions {
 
 /** Largest grid: 64 MB of float32. */
 export const MAX_VOXELS = 2 ** 24;
-/** Splats that the grid is made of; scenes with more are sampled evenly, and each sample stands for those around it. */
+/** Maximum number of splats for the grid; larger scenes are sampled evenly, and each sample represents its neighbors. */
 const MAX_SPLATS = 500_000;
-/** Share of the splats on each side that may lie outside of the grid, so that distant outliers do not enlarge it. */
+/** Fraction of the splats that may lie outside the grid on each side, so that distant outliers do not enlarge it. */
 const OUTLIERS = 0.003;
-/** Voxels around the scene that stay empty. */
+/** Empty voxels around the scene. */
 const MARGIN = 4;
 const MIN_ALPHA = 1 / 255;
 const MAX_ALPHA = 0.999;
@@ -89,7 +89,7 @@ function emptyGrid(centers: Float32Array, wanted: number): ExtinctionGrid {
   return { values: new Float32Array(nx * ny * nz), corner: [x, y, z], size: [nx, ny, nz], voxel };
 }
 
-/** Adds splat `i`, whose center is entry `k`; `share` is the number of splats that it stands for. */
+/** Adds splat `i`, whose center is entry `k`; `share` is the number of splats that it represents. */
 function addSplat(
   { values, corner, size, voxel }: ExtinctionGrid,
   cloud: GaussianCloud,

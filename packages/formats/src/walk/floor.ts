@@ -10,18 +10,19 @@ export interface FloorOptions extends GridOptions {
   readonly radius?: number;
   /** Largest step up or down, meters; default 0.3. */
   readonly step?: number;
-  /** Point, meters and y up, near which the walk starts. Default: above the middle of the scene. */
+  /** Point, meters and y up, near the start of the walk. Default: above the center of the scene. */
   readonly near?: Vector3;
 }
 
-/** Gaps of the floor of at most this width are bridged, meters. */
+/** Maximum width of gaps in the floor that are bridged, meters. */
 const BRIDGE = 0.3;
-/** A floor belongs to the start if it comes this near to it, meters. */
+/** Maximum distance of a floor from the start, meters. */
 const REACH = 3;
 
 /**
- * Finds the floor of a scene on which a person can walk, from its splats alone: solid voxels with free height above them, joined by a flood fill of places
- * that hold a body. It takes the largest floor below the point `near` that comes within 3 m of it; if there is none, the lowest of the large floors.
+ * Finds the walkable floor of a scene from its splats alone: solid voxels with free height above them, joined by a
+ * flood fill of positions that fit a body. Uses the largest floor below the point `near` that comes within 3 m of it;
+ * if there is none, the lowest of the large floors.
  * @throws GaussianSplatError `argument/value` for lengths that are not positive and finite.
  */
 export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMap {
@@ -29,10 +30,13 @@ export function makeWalkMap(cloud: GaussianCloud, options: FloorOptions): WalkMa
   return floorOf(grid, solidsOf(grid), options);
 }
 
-/** A grid, and what is known of how the density of a solid voxel varies. */
+/** A grid, optionally with the optical depth of its voxels. */
 type FloorGrid = VoxelGrid & Partial<ExtinctionGrid>;
 
-/** The same from a grid of solid voxels, [nz, ny, nx], 1 for solid. Without values a surface lies in the middle of its voxel. */
+/**
+ * The same from a grid of solid voxels, [nz, ny, nx], 1 for solid. Without values the surface is in the center of its
+ * voxel.
+ */
 export function floorOf(grid: FloorGrid, solid: Uint8Array, options: Omit<FloorOptions, 'frame'> = {}): WalkMap {
   const body: Body = { height: 1.6, radius: 0.2, step: 0.3, ...options };
   const { corner, size, voxel } = grid;
@@ -54,12 +58,12 @@ interface Region {
   /** Index of the cell nearest to the start, and its distance in meters. */
   readonly nearest: number;
   readonly distance: number;
-  /** Height of the cell at which the fill began, meters. */
+  /** Height of the first cell of the flood fill, meters. */
   readonly bottom: number;
 }
 
 const NOWHERE: Region = { cells: [], heights: [], nearest: 0, distance: 0, bottom: 0 };
-/** Share of the largest floor that another must have to be preferred to it because it is lower. */
+/** Minimum area of a lower floor relative to the largest one to be preferred. */
 const COMPARABLE = 0.5;
 
 const largestOf = (regions: readonly Region[]): Region | undefined =>
@@ -68,7 +72,7 @@ const largestOf = (regions: readonly Region[]): Region | undefined =>
     undefined,
   );
 
-/** The lowest of the large floors: seen from outside, a roof may be as large as the floor under it. */
+/** The lowest of the large floors, because a roof may be as large as the floor under it. */
 function lowestOf(regions: readonly Region[]): Region {
   const most = largestOf(regions)?.cells.length ?? 0;
   const large = regions.filter(({ cells }) => cells.length >= COMPARABLE * most);
@@ -108,7 +112,10 @@ class FloorFinder {
     return this.#mapOf(largestOf(reached) ?? lowestOf(regions));
   }
 
-  /** Heights of the floors of a column, from the top down. The surface lies where extinction peaks, found by a parabola through three voxels. */
+  /**
+   * Heights of the floors of a column, from the top down. The surface is at the peak of the optical depth, interpolated
+   * by a parabola through three voxels.
+   */
   #floorsOf(x: number, z: number): number[] {
     const { values, size, corner, voxel } = this.#grid;
     const [nx, ny] = size;
@@ -166,7 +173,7 @@ class FloorFinder {
     return undefined;
   }
 
-  /** Whether something solid is in the way of a body between the height of a step and its own. */
+  /** Whether a solid voxel obstructs a body between the height of a step and its own. */
   #isBlocked(x: number, z: number, y: number): boolean {
     const { size, corner, voxel } = this.#grid;
     const [nx, ny, nz] = size;
@@ -180,7 +187,7 @@ class FloorFinder {
     return false;
   }
 
-  /** All that can be reached from a height of a column. */
+  /** Flood fill of all cells that can be reached from a height of a column. */
   #fill(start: number, height: number, near: Vector3): Region {
     const { size, corner, voxel } = this.#grid;
     const [nx, , nz] = size;
@@ -210,7 +217,7 @@ class FloorFinder {
     return { cells, heights, nearest, distance: shortest * voxel, bottom: height };
   }
 
-  /** The region alone, cut to its own rectangle. */
+  /** Extracts the region, cropped to its own rectangle. */
   #mapOf({ cells, heights, nearest }: Region): WalkMap {
     const { size, corner, voxel } = this.#grid;
     const [nx] = size;

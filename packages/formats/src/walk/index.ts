@@ -1,4 +1,4 @@
-/** The walkable floor of a scene: made from its splats, stored in `.floor` files, walked on. */
+/** The walkable floor of a scene: derived from its splats, stored in `.floor` files, used for walking. */
 export { extinctionOf, type ExtinctionGrid, type GridOptions, type UpFrame, type VoxelGrid } from './extinction.js';
 export { floorOf, makeWalkMap, type FloorOptions } from './floor.js';
 export { solidsOf } from './solids.js';

@@ -1,11 +1,17 @@
 import type { ExtinctionGrid } from './extinction.js';
 
-/** Opacity from which a voxel is solid. Lower values close doors, higher ones leave holes in walls: measured on rooms with known floors. */
+/**
+ * Minimum opacity of a solid voxel. Lower values close doors, higher ones leave holes in walls: measured on rooms with
+ * known floors.
+ */
 const SOLID_OPACITY = 0.4;
-/** Connected voxels, corners included, below which a piece is a floater. */
+/** Minimum size of a connected component in voxels (26-neighborhood); smaller ones are floaters. */
 const MIN_PIECE = 64;
 
-/** Which voxels of a grid block a body: [nz, ny, nx], 1 for solid. Pieces of fewer than 64 connected voxels are floaters and count as empty. */
+/**
+ * Returns the voxels of a grid that block a body: [nz, ny, nx], 1 for solid. Components of fewer than 64 connected
+ * voxels are floaters and count as empty.
+ */
 export function solidsOf({ values, size: [nx, ny, nz] }: ExtinctionGrid): Uint8Array {
   const limit = -Math.log(1 - SOLID_OPACITY);
   const solid = new Uint8Array(values.length);

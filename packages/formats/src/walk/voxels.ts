@@ -1,4 +1,7 @@
-/** The voxels of a scene that splat-transform writes (`.voxel.json` and `.voxel.bin`, versions 1.0 and 1.1), as solids that a floor is found in. */
+/**
+ * Voxels of a scene from splat-transform (`.voxel.json` and `.voxel.bin`, versions 1.0 and 1.1), as solids for finding
+ * a floor.
+ */
 import type { Vector3 } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from '../budget.js';
 import { grouped } from '../bytes.js';
@@ -36,8 +39,8 @@ export const isVoxelPath = (path: string): boolean => SUFFIX.test(path);
 export const voxelTreePath = (path: string): string => path.replace(SUFFIX, '.voxel.bin');
 
 /**
- * Reads voxels and turns them so that y points up.
- * @param frame rows of the rotation from the frame of the splats' file
+ * Reads voxels and rotates them so that y points up.
+ * @param frame Rows of the rotation from the coordinates of the splats' file.
  * @throws GaussianSplatError `decode/*`, `out-of-memory/budget`
  */
 export function readVoxels(files: VoxelFiles, frame: UpFrame, metersPerUnit: number): SolidGrid {
@@ -61,7 +64,7 @@ interface VoxelHead {
   readonly depth: number;
   readonly nodes: number;
   readonly words: number;
-  /** From version 1.1 on, the frame is the file's turned by half a turn about z. */
+  /** From version 1.1 on, coordinates are those of the file rotated by half a turn about z. */
   readonly isTurned: boolean;
 }
 
@@ -105,7 +108,7 @@ function readHead({ head, name, limits }: VoxelFiles): VoxelHead {
   };
 }
 
-/** Follows the nodes from the root down. Children stand behind their parents, so that no way leads round. */
+/** Traverses the nodes from the root. Children are stored after their parents, so there are no cycles. */
 class Octree {
   readonly #nodes: Uint32Array;
   readonly #masks: Uint32Array;
@@ -133,10 +136,11 @@ class Octree {
     return this.#solid;
   }
 
-  /** @param level halvings that are left down to blocks @param x first voxel of the node, as `y` and `z` */
+  /** @param level Remaining subdivisions down to blocks. @param x First voxel of the node, as `y` and `z`. */
   #visit(at: number, level: number, x: number, y: number, z: number): void {
     const [nx, ny, nz] = this.#size;
-    // Beyond the grid the tree is empty. What says otherwise is not followed, so that each visit is of voxels of its own.
+    // Outside the grid the tree is empty. Nodes that claim otherwise are skipped, so that each visit covers distinct
+    // voxels.
     if (x >= nx || y >= ny || z >= nz) return;
     const word = this.#nodes[at];
     const edge = BLOCK * 2 ** level;
@@ -175,7 +179,7 @@ class Octree {
   }
 }
 
-/** The same voxels along the axes of another frame: each takes what lies at its middle. */
+/** Resamples the voxels along the axes of other coordinates: each takes the value at its center. */
 function upright(grid: VoxelGrid, solid: Uint8Array, isTurned: boolean, frame: UpFrame, unit: number): SolidGrid {
   const sign = isTurned ? [-1, -1, 1] : [1, 1, 1];
   const rows = frame.map((row) => row.map((value, k) => value * sign[k]));
@@ -188,7 +192,7 @@ function upright(grid: VoxelGrid, solid: Uint8Array, isTurned: boolean, frame: U
   ) as unknown as VoxelGrid['size'];
   const corner = ranges.map(([low]) => low) as unknown as Vector3;
   const turned = new Uint8Array(size[0] * size[1] * size[2]);
-  // The rotation's inverse has its columns as rows.
+  // The inverse of a rotation has its columns as rows.
   const from = (axis: number, p: readonly number[]): number =>
     Math.floor((sum(rows.map((row, k) => row[axis] * p[k])) - grid.corner[axis]) / grid.voxel);
   for (let z = 0, at = 0; z < size[2]; z++)

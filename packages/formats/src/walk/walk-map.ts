@@ -2,8 +2,8 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { gunzipSync, gzipSync } from 'fflate';
 
 /**
- * The floor on which a person can walk: for each cell of a horizontal grid the heights at which a body fits. Frame with y up, lengths in meters.
- * A cell has several heights if floors lie above each other, as on stairs and galleries.
+ * The walkable floor: for each cell of a horizontal grid the heights that fit a body. Coordinates with y up, lengths in
+ * meters. A cell has several heights if floors overlap, as on stairs and galleries.
  */
 export interface WalkMap {
   /** Edge of a cell, meters. */
@@ -14,15 +14,18 @@ export interface WalkMap {
   readonly depth: number;
   /** Layers of [depth, width] heights in meters, x innermost; NaN without a floor. */
   readonly layers: readonly Float32Array[];
-  /** Largest difference of height between neighbors that a person steps over, meters. */
+  /** Maximum step height between neighboring cells, meters. */
   readonly step: number;
-  /** A place on the floor near the point that it was made from. */
+  /** Start of the walk: the position on the floor nearest to the requested point. */
   readonly start: readonly [x: number, y: number, z: number];
   /** Area of the floor, m². */
   readonly area: number;
 }
 
-/** Height of the floor at a point, within one step of the height `near`; undefined if a body cannot stand there. */
+/**
+ * Returns the height of the floor at a point, within one step of the height `near`; undefined if a body cannot stand
+ * there.
+ */
 export function floorAt(map: WalkMap, x: number, z: number, near: number): number | undefined {
   const i = Math.floor((x - map.corner[0]) / map.cell);
   const j = Math.floor((z - map.corner[1]) / map.cell);
@@ -37,9 +40,9 @@ export function floorAt(map: WalkMap, x: number, z: number, near: number): numbe
 }
 
 /**
- * One step on the floor. A body that meets a wall slides along it.
- * @param from x, height of the floor, z: meters
- * @returns the new place; the same array if the body is blocked
+ * Moves one step on the floor. A body that meets a wall slides along it.
+ * @param from x, height of the floor, z: meters.
+ * @returns The new position; the same array if the body is blocked.
  */
 export function stepOn(
   map: WalkMap,
@@ -70,8 +73,9 @@ function walkTo(map: WalkMap, x: number, y: number, z: number, toX: number, toZ:
 }
 
 /**
- * The shortest way over the floor between two places, found breadth first over cells, eight neighbors each.
- * @returns places from cell to cell, the last at the end of the way; empty if there is none
+ * Finds the shortest path over the floor between two positions, by breadth-first search over cells, eight neighbors
+ * each.
+ * @returns Positions from cell to cell, the last at the end of the path; empty if there is none.
  */
 export function wayTo(
   map: WalkMap,
@@ -102,7 +106,7 @@ export function wayTo(
       const height = floorAt(map, toX, toZ, y);
       const isCorner = i !== 0 && j !== 0;
       if (height === undefined) continue;
-      // A diagonal step needs both cells beside it: a body does not cut corners.
+      // A diagonal step needs both adjacent cells, because a body does not cut corners.
       if (isCorner && (!isFree(map, middle(index + i), y) || !isFree(map, middle(index + width * j), y))) continue;
       const nextKey = keyOf(next, height);
       if (visited.has(nextKey)) continue;
@@ -141,14 +145,17 @@ function back(
 
 const FORMAT = 'gaussian-splat-walk-map';
 const VERSION = 1;
-/** The int16 that stands for no floor. */
+/** The int16 that marks a missing floor. */
 const NO_FLOOR = -0x8000;
-/** Smallest unit in which heights are stored, meters. */
+/** Smallest unit of stored heights, meters. */
 const HEIGHT_UNIT = 0.01;
-/** Most that a file may unpack to: 64 MB. */
+/** Maximum unpacked size of a file: 64 MB. */
 const MAX_BYTES = 2 ** 26;
 
-/** The bytes of a `.floor` file: gzip of one line of JSON and, layer after layer, int16 differences along rows, in units of `heightUnit` meters. */
+/**
+ * Encodes a `.floor` file: gzip of one line of JSON and, layer by layer, int16 differences along rows, in units of
+ * `heightUnit` meters.
+ */
 export function encodeWalkMap(map: WalkMap): Uint8Array {
   const { layers, ...rest } = map;
   let highest = 0;
@@ -175,7 +182,7 @@ export function encodeWalkMap(map: WalkMap): Uint8Array {
 
 /**
  * Reads a `.floor` file.
- * @param name what errors call the file
+ * @param name Name of the file in errors.
  * @throws GaussianSplatError `decode/corrupt`
  */
 export function decodeWalkMap(file: Uint8Array, name = 'walk map'): WalkMap {

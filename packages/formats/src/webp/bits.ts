@@ -1,8 +1,8 @@
-/** A fault in a WebP file; the caller knows the file's name and makes it an error for people. */
+/** A fault in a WebP file; the caller adds the file's name and converts it to an error for users. */
 export class WebpError extends Error {
-  /** True if the file may merely be cut. */
+  /** Whether the file may only be truncated. */
   readonly isCut: boolean;
-  /** True if the file is sound but of a kind that is not read. */
+  /** Whether the file is valid but of an unsupported kind. */
   readonly isForeign: boolean;
 
   constructor(found: string, kind: 'damaged' | 'cut' | 'foreign' = 'damaged') {
@@ -12,18 +12,18 @@ export class WebpError extends Error {
   }
 }
 
-/** Zeros behind the stream, so that a read of 32 bits at its end stays within the array. */
+/** Zeros after the stream, so that a 32-bit read at its end stays within the array. */
 const PADDING = 8;
 
 /** Reads bits, least significant first. */
 export class BitReader {
   readonly bytes: Uint8Array;
-  /** Bits read so far. The decoder's inner loop keeps a copy of its own and writes it back. */
+  /** Number of bits read. The decoder's inner loop keeps a local copy and writes it back. */
   position = 0;
   /** Bits of the stream. */
   readonly length: number;
 
-  /** Charges what is about to be allocated. */
+  /** Charges bytes before they are allocated. */
   readonly take: (bytes: number) => void;
 
   constructor(stream: Uint8Array, take: (bytes: number) => void) {
@@ -42,7 +42,7 @@ export class BitReader {
   }
 }
 
-/** At least 25 bits from a bit position on; what lies behind is zeros. */
+/** At least 25 bits from a bit position on, padded with zeros beyond the end. */
 export function window32(bytes: Uint8Array, position: number): number {
   const at = position >>> 3;
   return (bytes[at] | (bytes[at + 1] << 8) | (bytes[at + 2] << 16) | (bytes[at + 3] << 24)) >>> (position & 7);

@@ -13,16 +13,17 @@ export interface WebpImage {
 
 const SIGNATURE = 0x2f;
 
-/** Size of a lossless image from its first bytes: nothing is decoded or allocated. */
+/** Size of a lossless image from its first bytes; decodes and allocates nothing. */
 export function webpSize(file: Uint8Array): { width: number; height: number } {
   const bits = new BitReader(losslessStream(file).subarray(0, 5), () => undefined);
   return readHeader(bits);
 }
 
 /**
- * Decodes a lossless WebP image (RFC 9649) to the exact bytes that were encoded, alpha and the colours below it included, which
- * browsers' canvases do not promise. Memory is bounded by the image's size: look at {@link webpSize} first.
- * @param take hears what is about to be allocated beside the pixels, and may throw
+ * Decodes a lossless WebP image (RFC 9649) to the exact encoded bytes, including alpha and the colors of transparent
+ * pixels, which browsers' canvases do not guarantee. Memory is bounded by the image's size: check {@link webpSize}
+ * first.
+ * @param take Is called before each allocation other than the pixels, and may throw.
  * @throws WebpError
  */
 export function decodeWebp(file: Uint8Array, take: (bytes: number) => void = () => undefined): WebpImage {

@@ -1,20 +1,27 @@
 import { decodeWebp, type WebpImage } from './decode.js';
 
-/** 6 x 6 pixels of many colours, of alpha 0 to 255, and without alpha: what a decoder that premultiplies or converts colours would change. */
+/**
+ * 6 x 6 pixels of many colors, with alpha 0 to 255, and without alpha: a decoder that premultiplies or converts colors
+ * would change them.
+ */
 const PROBES = [
   'UklGRq4AAABXRUJQVlA4TKEAAAAvBUABEE2UIaL/sYiI/gfYtLbdhoALCG+Ng2lYnixdBB49BkzAJFumKHtHUIEwimQrzhEkIAEHIAEJLQEdCMlt0xABkRAXuwJGtW2DamAkhQrmOlhmguihwY4ggiWBCCL89UcG0rZJle3Krj3y3Ip/qD/TxF6uTv3nMWrx0wAoxwDCb0oPfeKKABhh8wX0kYEVF7q6GSSAG2zV0pYC8AMEAAA=',
   'UklGRqAAAABXRUJQVlA4TJMAAAAvBUABAE2UIaL/sYiI/gfYtLbdhoALCG+Ng2lYnixdBB49BkzAJFumKHtHUIEwimQrzhEkIAEHIAEJLQEdCMlt0xABkRAXuwJGtW2DamAkhQrmOlhmguihwY4ggiWBCCL89UcReW7xD/2ZxF7q1OcxWvwaQDkDhH9Kjz65IsCIzRf0kWHloqvbkIAbtrq0VYAfCAAA',
 ];
-/** The kind of the only chunk of a file that has nothing but its pixels, at byte 12: others may ask for colours or turns that a browser heeds. */
+/**
+ * Type, at byte 12, of the only chunk of a file that contains just pixels: other chunks may specify colors or rotations
+ * that a browser applies.
+ */
 const PLAIN = [0x56, 0x50, 0x38, 0x4c];
-/** Bytes of a file below which our decoder is done sooner. */
+/** Minimum file size in bytes for the browser's decoder; ours is faster for smaller files. */
 const LEAST_BYTES = 4096;
 
 let isExact: Promise<boolean> | undefined;
 
 /**
- * Decodes a lossless WebP image by the browser's own decoder, off this thread, where there is one and it gives exact pixels, which is tried once.
- * @returns undefined where it is left to {@link decodeWebp}, which also says what is wrong with a file
+ * Decodes a lossless WebP image with the browser's own decoder, asynchronously, if it is available and exact, which is
+ * tested once.
+ * @returns Undefined to fall back to {@link decodeWebp}, which also reports faults of a file.
  */
 export async function decodeNatively(
   file: Uint8Array,
@@ -61,7 +68,7 @@ async function decode(file: Uint8Array): Promise<WebpImage> {
 
 async function pixelsOf(image: VideoFrame): Promise<WebpImage> {
   const { codedWidth: width, codedHeight: height, format } = image;
-  // Where the first and the third byte go to.
+  // Shifts of the first and the third byte.
   const [first, third] = format?.startsWith('RGB') ? [16, 0] : [0, 16];
   if (!/^(RGB|BGR)[AX]$/.test(format ?? '')) throw new Error(`pixels of format ${format}`);
   const pixels = new Uint32Array(width * height);

@@ -5,20 +5,20 @@ const LITERALS = 256;
 const LENGTH_SYMBOLS = 24;
 const DISTANCE_SYMBOLS = 40;
 const CACHE_HASH = 0x1e35a7bd;
-/** What the five codes of a group take beside their tables, and what their reading costs at least. */
+/** Bytes of the five codes of a group besides their tables, as the minimum cost of reading them. */
 const GROUP_BYTES = 1024;
 
-/** The codes of one group: green with lengths and colour cache, red, blue, alpha, distance. */
+/** The codes of one group: green with lengths and color cache, red, blue, alpha, distance. */
 type Group = readonly [green: PrefixCode, red: PrefixCode, blue: PrefixCode, alpha: PrefixCode, distance: PrefixCode];
 
-/** Which group codes which pixels: that of the pixel (x >> bits, y >> bits) of a small image. */
+/** Maps pixels to groups: pixel (x, y) uses the group at (x >> bits, y >> bits) of a small image. */
 interface GroupMap {
   readonly bits: number;
   readonly width: number;
   readonly groups: Uint32Array;
 }
 
-/** Neighbours that the 120 shortest distances stand for, as [columns to the left, rows up], in the order of RFC 9649. */
+/** Neighbors of the 120 shortest distance codes, as [columns to the left, rows up], in the order of RFC 9649. */
 const NEIGHBOURS: readonly number[] = [
   ...[0, 1, 1, 0, 1, 1, -1, 1, 0, 2, 2, 0, 1, 2, -1, 2, 2, 1, -2, 1, 2, 2, -2, 2, 0, 3, 3, 0, 1, 3, -1, 3, 3, 1, -3, 1],
   ...[2, 3, -2, 3, 3, 2, -3, 2, 0, 4, 4, 0, 1, 4, -1, 4, 4, 1, -4, 1, 3, 3, -3, 3, 2, 4, -2, 4, 4, 2, -4, 2, 0, 5],
@@ -65,7 +65,7 @@ function readGroups(bits: BitReader, count: number, cacheBits: number): Group[] 
   });
 }
 
-/** The inner loop of the whole reader; the position of the bits is kept in a local variable for that reason. */
+/** The innermost loop of the reader, so the bit position is kept in a local variable. */
 function decode(
   bits: BitReader,
   pixels: Uint32Array,
@@ -145,7 +145,7 @@ function decode(
   bits.position = position;
 }
 
-/** Pixels back for a distance code: the first 120 stand for neighbours. */
+/** Number of pixels back for a distance code: the first 120 represent neighbors. */
 function distanceOf(code: number, width: number): number {
   if (code > NEIGHBOURS.length / 2) return code - NEIGHBOURS.length / 2;
   const k = 2 * (code - 1);

@@ -2,7 +2,7 @@ type Predictor = (left: number, top: number, topRight: number, topLeft: number) 
 
 const BLACK = 0xff000000;
 
-/** The 14 ways to foretell a pixel from its neighbours (RFC 9649, 4.1); the two that are left mean black. */
+/** The 14 predictors of a pixel from its neighbors (RFC 9649, 4.1); the two remaining codes mean black. */
 const PREDICTORS: readonly Predictor[] = [
   () => BLACK,
   (left) => left,
@@ -25,7 +25,7 @@ const PREDICTORS: readonly Predictor[] = [
   () => BLACK,
 ];
 
-/** Undoes prediction in place: every pixel holds the difference to what its block's predictor foretells. */
+/** Inverts prediction in place: every pixel holds the difference from its block's predictor. */
 export function predict(
   pixels: Uint32Array,
   width: number,
@@ -45,7 +45,7 @@ export function predict(
       for (; x < end; x++) {
         const at = row + x;
         const above = at - width;
-        // Right of the last column the next row begins, as the format wants it.
+        // To the right of the last column is the start of the next row, as the format specifies.
         const foretold = predictor(pixels[at - 1], pixels[above], pixels[above + 1], pixels[above - 1]);
         pixels[at] = addPixels(pixels[at], foretold);
       }

@@ -1,12 +1,12 @@
 import { type BitReader, WebpError } from './bits.js';
 
-/** Bits that the first table looks up; codes are up to 15 bits long. */
+/** Bits of the root table's index; codes are up to 15 bits long. */
 export const ROOT_BITS = 9;
 const MAX_LENGTH = 15;
 
 /**
- * A prefix code as tables. Entry: symbol or start of a second table in the upper bits, in the lower 8 the bits to take, and
- * {@link LINK} if a second table follows.
+ * A prefix code as tables. Entry: symbol or start of a second table in the upper bits, in the lower 8 the number of
+ * bits to consume, and {@link LINK} if a second table follows.
  */
 export interface PrefixCode {
   readonly table: Uint32Array;
@@ -14,10 +14,10 @@ export interface PrefixCode {
   readonly rootBits: number;
 }
 
-/** Set where the entry leads to a second table; the other low bits then say how many bits index it. */
+/** Set if the entry refers to a second table; the other low bits are then the bits of its index. */
 export const LINK = 0x80;
 
-/** The order in which the lengths of the code of lengths are stored. */
+/** Storage order of the code lengths of the length code. */
 const LENGTH_ORDER = [17, 18, 0, 1, 2, 3, 4, 5, 16, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /** Reads one prefix code over `alphabet` symbols. */
@@ -28,7 +28,7 @@ export function readPrefixCode(bits: BitReader, alphabet: number): PrefixCode {
   return buildTables(lengths);
 }
 
-/** One or two symbols, named outright: their code is known without lengths, which would cost hundreds of steps for 4 bits. */
+/** One or two explicit symbols: their code needs no lengths, which would cost hundreds of steps for 4 bits. */
 function readSimple(bits: BitReader, alphabet: number): PrefixCode {
   const count = bits.read(1) + 1;
   const first = bits.read(bits.read(1) === 1 ? 8 : 1);
@@ -64,7 +64,7 @@ function readLengths(bits: BitReader, lengths: Uint8Array): void {
   }
 }
 
-/** The next symbol; for headers, where speed does not matter. */
+/** Reads the next symbol, without optimization, for headers. */
 export function readSymbol(bits: BitReader, { table, rootBits }: PrefixCode): number {
   let ahead = 0;
   const start = bits.position;
@@ -85,7 +85,7 @@ export function readSymbol(bits: BitReader, { table, rootBits }: PrefixCode): nu
   return entry >>> 8;
 }
 
-/** Canonical codes of the given lengths, 0 for symbols that do not occur. A single symbol takes no bits. */
+/** Canonical codes of the given lengths, 0 for unused symbols. A single symbol takes no bits. */
 function buildTables(lengths: Uint8Array): PrefixCode {
   const counts = new Uint16Array(MAX_LENGTH + 1);
   let used = 0;
@@ -108,7 +108,7 @@ function buildTables(lengths: Uint8Array): PrefixCode {
   return { table: fillTables(lengths, codes, rootBits), rootBits };
 }
 
-/** The first code of each length; a code must be complete, or some bits would mean nothing. */
+/** The first code of each length; a code must be complete, because otherwise some bits would be undefined. */
 function firstCodes(counts: Uint16Array): Uint16Array {
   const first = new Uint16Array(MAX_LENGTH + 2);
   let room = 1;
@@ -129,7 +129,7 @@ function reversed(code: number, length: number): number {
 
 function fillTables(lengths: Uint8Array, codes: Uint16Array, rootBits: number): Uint32Array {
   const rootSize = 1 << rootBits;
-  /** Bits beyond the root of the longest code behind each entry of the root. */
+  /** Bits beyond the root table of the longest code with each root prefix. */
   const beyond = new Uint8Array(rootSize);
   lengths.forEach((length, symbol) => {
     const root = codes[symbol] & (rootSize - 1);

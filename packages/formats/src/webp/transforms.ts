@@ -2,7 +2,7 @@ import { type BitReader, WebpError } from './bits.js';
 import { readPixels } from './pixels.js';
 import { addPixels, predict } from './predictors.js';
 
-/** A change that the encoder made to the pixels: how to undo it, and the width of the image before it is undone. */
+/** A transform that the encoder applied to the pixels: its inverse, and the width of the image before the inversion. */
 export interface Transform {
   readonly type: number;
   readonly storedWidth: number;
@@ -11,7 +11,7 @@ export interface Transform {
 
 const [PREDICTOR, CROSS_COLOUR, SUBTRACT_GREEN] = [0, 1, 2];
 
-/** Reads one transform of an image that is `width` pixels wide after it is undone. */
+/** Reads one transform of an image that is `width` pixels wide after the inversion. */
 export function readTransform(bits: BitReader, width: number, height: number): Transform {
   const type = bits.read(2);
   if (type === SUBTRACT_GREEN) return { type, storedWidth: width, undo: addGreen };
@@ -60,7 +60,7 @@ function addCrossColour(
   return pixels;
 }
 
-/** Up to 256 colours; with 16 or fewer, several indices share the green byte of one stored pixel. */
+/** Up to 256 colors; with 16 or fewer, several indices share the green byte of one stored pixel. */
 function readPalette(bits: BitReader, type: number, width: number, height: number): Transform {
   const size = bits.read(8) + 1;
   const differences = readPixels(bits, size, 1, false);

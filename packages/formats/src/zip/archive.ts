@@ -7,13 +7,13 @@ import type { SceneSource } from '../scene-format.js';
 import { crc32 } from './crc32.js';
 import { readDirectory, type ZipEntry } from './directory.js';
 
-/** Deflate cannot compress better than this. */
+/** Maximum ratio of deflate. */
 const MAX_COMPRESSION_RATIO = 1032;
 const HEADER = 0x04034b50;
 const HEADER_BYTES = 30;
 const [STORED, DEFLATED] = [0, 8];
 
-/** A ZIP file whose entries are inflated one at a time, when they are asked for. */
+/** A ZIP file whose entries are inflated on demand. */
 export class Archive {
   readonly #file: Uint8Array;
   readonly #name: string;
@@ -36,14 +36,15 @@ export class Archive {
     return [...this.#entries.keys()];
   }
 
-  /** Bytes of a file once it is inflated, as the directory says. */
+  /** Inflated size of a file in bytes, as the directory declares. */
   lengthOf(path: string): number {
     return this.#entries.get(normalised(path))?.bytes ?? 0;
   }
 
   /**
-   * The content of a file; not to be changed, for it may be the archive's own memory. Throws `decode/corrupt`, `decode/truncated`, `decode/unsupported` or `out-of-memory/budget`.
-   * @param path may have `.` and `..` in it
+   * Returns the content of a file; read-only, because it may be the archive's own memory. Throws `decode/corrupt`,
+   * `decode/truncated`, `decode/unsupported` or `out-of-memory/budget`.
+   * @param path May contain `.` and `..`.
    */
   open(path: string): Uint8Array {
     const entry = this.#entries.get(normalised(path));
@@ -54,17 +55,17 @@ export class Archive {
       const found = `compression method ${entry.method}`;
       throw damaged(where, 'a file that is stored or deflated', found, 'decode/unsupported');
     }
-    // Directories may say anything: no more is there than the file has.
+    // A directory may declare any size, but the file limits it.
     const there = Math.min(entry.compressedBytes, this.#file.length);
     if (entry.bytes > MAX_COMPRESSION_RATIO * there + 64) {
       const found = `${grouped(entry.bytes)} bytes out of ${grouped(there)}`;
       throw damaged(where, 'a size that deflate can reach', found);
     }
-    // Whether or not it is inflated, all of it is read for its checksum.
+    // The checksum reads all of it, inflated or not.
     this.#budget.take(entry.bytes, where);
     const content = this.#contentOf(entry, where);
     if (content.length !== entry.bytes) throw damaged(where, `${grouped(entry.bytes)} bytes`, grouped(content.length));
-    // Programs that do not know it before they write the content leave 0.
+    // Programs that do not know the checksum before they write the content leave 0.
     if (entry.crc === 0) return content;
     const crc = crc32(content);
     if (crc === entry.crc) return content;
@@ -100,7 +101,7 @@ const hex = (value: number): string => value.toString(16).padStart(8, '0');
 
 const isFolder = (path: string): boolean => /[\\/]$/.test(path);
 
-/** A path without `.` and `..`, which stay within the archive. */
+/** Resolves `.` and `..` of a path within the archive. */
 function normalised(path: string): string {
   const parts: string[] = [];
   for (const part of path.replaceAll('\\', '/').split('/')) {

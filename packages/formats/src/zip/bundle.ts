@@ -4,8 +4,8 @@ import { Archive } from './archive.js';
 import { listed, namedLike, relevant } from './paths.js';
 
 /**
- * The description in a SOG bundle, and a way to its images.
- * @throws GaussianSplatError `decode/unknown-format` if there is none; what is wrong with the archive
+ * Returns the description in a SOG bundle, and an opener for its images.
+ * @throws GaussianSplatError `decode/unknown-format` if there is none; also faults of the archive.
  */
 export function openBundle(source: Pick<SceneSource, 'bytes' | 'name' | 'budget'>): {
   bytes: Uint8Array;

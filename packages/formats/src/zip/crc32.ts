@@ -1,11 +1,11 @@
-/** The polynomial of ISO 3309 as ZIP, gzip and PNG have it: lowest bit first. */
+/** The polynomial of ISO 3309 in ZIP, gzip and PNG: lowest bit first. */
 const POLYNOMIAL = 0xedb88320;
-/** Bytes that are taken at once: a table for each. */
+/** Bytes in each step, with one table each. */
 const SLICES = 4;
 
 let tables: readonly Int32Array[] | undefined;
 
-/** What each byte makes of a remainder of 0, followed by none to three bytes of zeros. */
+/** Remainder of each byte followed by none to three bytes of zeros. */
 function makeTables(): readonly Int32Array[] {
   const first = Int32Array.from({ length: 256 }, (_, byte) => {
     for (let bit = 0; bit < 8; bit++) byte = (byte >>> 1) ^ (byte & 1 ? POLYNOMIAL : 0);
@@ -16,7 +16,7 @@ function makeTables(): readonly Int32Array[] {
   return made;
 }
 
-/** CRC-32 of bytes, an unsigned number; four bytes a step ("slicing", Kounavis and Berry 2005). */
+/** CRC-32 of bytes, an unsigned number; four bytes in each step ("slicing", Kounavis and Berry 2005). */
 export function crc32(bytes: Uint8Array): number {
   const [t0, t1, t2, t3] = (tables ??= makeTables());
   let rest = -1;

@@ -3,16 +3,16 @@ import { damaged } from '../faults.js';
 
 /** A file within an archive, as the directory describes it. */
 export interface ZipEntry {
-  /** As the archive writes it. */
+  /** Path as in the archive. */
   readonly path: string;
-  /** How it is compressed: 0 not at all, 8 deflate. */
+  /** Compression method: 0 stored, 8 deflate. */
   readonly method: number;
   readonly isEncrypted: boolean;
   readonly compressedBytes: number;
   readonly bytes: number;
-  /** CRC-32 of the content; 0 where it is not told. */
+  /** CRC-32 of the content; 0 if unknown. */
   readonly crc: number;
-  /** Byte of the file's own header, which its content follows. */
+  /** Offset of the file's own header, which its content follows. */
   readonly headerAt: number;
 }
 
@@ -23,9 +23,9 @@ const LOCATOR_64 = 0x07064b50;
 const LOCATOR_64_BYTES = 20;
 const ENTRY = 0x02014b50;
 const ENTRY_BYTES = 46;
-/** Entries of an archive; a streamed scene of 50 million splats has some thousands. */
+/** Maximum number of entries; a streamed scene of 50 million splats has some thousands. */
 const MAX_ENTRIES = 100_000;
-/** What 32 bits hold of a number that stands in the 64-bit field instead. */
+/** Value of a 32-bit field whose number is in the 64-bit field instead. */
 const ELSEWHERE = 0xffffffff;
 const FLAG_ENCRYPTED = 1;
 const FLAG_UTF8 = 0x800;
@@ -53,14 +53,14 @@ export function readDirectory(file: Uint8Array, name: string): ZipEntry[] {
   return entries;
 }
 
-/** The directory stands at the end, before a comment: without it the file is cut. */
+/** The directory is at the end, before a comment: without it the file is truncated. */
 function findDirectory(view: DataView, name: string): { count: number; start: number } {
   const last = view.byteLength - DIRECTORY_END_BYTES;
   const ends: number[] = [];
   for (let at = last; at >= Math.max(0, last - 65_535); at--) {
     if (view.getUint32(at, true) === DIRECTORY_END) ends.push(at);
   }
-  // Comments may hold anything; the one that ends with the file is meant.
+  // Comments may contain anything; the record whose comment ends with the file is the right one.
   const end =
     ends.find((at) => at + DIRECTORY_END_BYTES + view.getUint16(at + 20, true) === view.byteLength) ?? ends[0];
   if (end === undefined) {
@@ -106,7 +106,7 @@ function longNumbers(view: DataView, start: number, end: number): number[] {
   return [];
 }
 
-/** Names are UTF-8 where a flag says so, and on macOS where it does not. */
+/** Names are UTF-8 if a flag declares it, and on macOS even without it. */
 function pathOf(bytes: Uint8Array, isUtf8: boolean): string {
   try {
     return utf8.decode(bytes);

@@ -1,16 +1,16 @@
 import { quote } from '../bytes.js';
 
-/** What macOS writes beside files, with their names. */
+/** Metadata files that macOS adds, with the names of others. */
 const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
 
-/** Paths of files that somebody meant to pack. */
+/** Paths of files without such metadata. */
 export const relevant = (paths: readonly string[]): string[] => paths.filter((path) => !NO_CONTENT.test(path));
 
-/** Files of this name, those that lie least deep first. */
+/** Files of this name, least nested first. */
 export const namedLike = (name: string, paths: readonly string[]): string[] =>
   paths.filter((path) => path.split('/').pop() === name).sort((a, b) => depthOf(a) - depthOf(b));
 
-/** Those that lie least deep. */
+/** The least nested paths. */
 export function shallowest(paths: readonly string[]): string[] {
   const depth = paths.reduce((least, path) => Math.min(least, depthOf(path)), Infinity);
   return paths.filter((path) => depthOf(path) === depth);

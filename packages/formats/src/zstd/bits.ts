@@ -2,7 +2,7 @@
 export class ZstdError extends Error {
   override readonly name = 'ZstdError';
   readonly byte: number;
-  /** True if the stream ends too early, false if its content is wrong. */
+  /** Whether the stream ends too early; false if its content is invalid. */
   readonly isCut: boolean;
 
   constructor(message: string, byte: number, isCut = false) {
@@ -18,16 +18,16 @@ export function highestBit(value: number): number {
 }
 
 /**
- * Reads a bit stream from its end to its beginning, as entropy-coded parts of Zstandard are written (RFC 8878, 4.1).
- * Bits before the beginning read as zeros and make {@link left} negative; callers check it where that is an error.
+ * Reads a bit stream from its end to its beginning, as in entropy-coded parts of Zstandard (RFC 8878, 4.1). Bits before
+ * the beginning read as zeros and make {@link left} negative; callers check it if that is an error.
  */
 export class BackwardBits {
   readonly #bytes: Uint8Array;
   readonly #start: number;
-  /** Bits that are still to be read. */
+  /** Number of unread bits. */
   left: number;
 
-  /** The stream is the bytes `start` to `end`; the highest set bit of the last one marks where it ends. */
+  /** The stream is the bytes `start` to `end`; the highest set bit of the last one marks its end. */
   constructor(bytes: Uint8Array, start: number, end: number) {
     const last = end > start ? bytes[end - 1] : 0;
     if (last === 0) throw new ZstdError('a bit stream without an end mark', end);
@@ -36,7 +36,7 @@ export class BackwardBits {
     this.left = 8 * (end - start - 1) + highestBit(last);
   }
 
-  /** The next `count` bits, 0 to 31, first bit highest. */
+  /** Reads the next `count` bits, 0 to 31, first bit highest. */
   read(count: number): number {
     if (count > 16) return this.read(count - 16) * 65_536 + this.read(16);
     const bits = this.peek(count);
@@ -44,7 +44,7 @@ export class BackwardBits {
     return bits;
   }
 
-  /** The next `count` bits, 0 to 16, without passing them. */
+  /** Returns the next `count` bits, 0 to 16, without consuming them. */
   peek(count: number): number {
     const position = this.left - count;
     if (position < 0) return this.#beforeStart(count, -position);

@@ -8,10 +8,10 @@ const FRAME_MAGIC = [0x28, 0xb5, 0x2f, 0xfd];
 
 /**
  * Decompresses Zstandard data (RFC 8878): one or more frames, together exactly `length` bytes. It never writes more
- * than that and stops at the first contradiction, so that the time and memory a hostile stream can cost are bounded by
- * its own size and `length`. The checksum, where there is one, is skipped.
+ * than that and stops at the first contradiction, so that the time and memory of a hostile stream are bounded by its
+ * own size and `length`. A checksum is skipped.
  *
- * @throws ZstdError with the byte of the stream where it breaks the format.
+ * @throws ZstdError with the byte of the stream at the fault.
  */
 export function decompressZstd(bytes: Uint8Array, length: number): Uint8Array {
   const output: Output = { bytes: new Uint8Array(length), frameStart: 0, position: 0, repeatedOffsets: [1, 4, 8] };
@@ -26,7 +26,7 @@ export function decompressZstd(bytes: Uint8Array, length: number): Uint8Array {
   return output.bytes;
 }
 
-/** Decompresses the frame at byte `start`; returns the byte after it. */
+/** Decompresses the frame at byte `start`; returns the offset after it. */
 function decompressFrame(bytes: Uint8Array, start: number, output: Output): number {
   const { blocksStart, hasChecksum } = readFrameHeader(bytes, start, output.bytes.length - output.position);
   output.frameStart = output.position;

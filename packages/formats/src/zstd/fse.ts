@@ -5,19 +5,19 @@ export interface FseTable {
   /** log2 of the number of states. */
   readonly accuracyLog: number;
   readonly symbols: Uint8Array;
-  /** Bits to read for the next state, and what to add to them. */
+  /** Number of bits to read for the next state, and the base value to add to them. */
   readonly bits: Uint8Array;
   readonly baselines: Uint16Array;
 }
 
-/** Table of a code with one symbol only, which takes no bits. */
+/** Table of a code with a single symbol, which takes no bits. */
 export function singleSymbolTable(symbol: number): FseTable {
   return { accuracyLog: 0, symbols: Uint8Array.of(symbol), bits: new Uint8Array(1), baselines: new Uint16Array(1) };
 }
 
 /**
- * Table of a distribution over 2^accuracyLog states; probability -1 stands for "less than 1", which takes one state.
- * The probabilities must add up to the number of states.
+ * Builds the table of a distribution over 2^accuracyLog states; probability -1 means "less than 1", which takes one
+ * state. The probabilities must add up to the number of states.
  */
 export function buildFseTable(probabilities: readonly number[], accuracyLog: number): FseTable {
   const size = 1 << accuracyLog;
@@ -64,7 +64,7 @@ export function readFseTable(
   };
   let remaining = 1 << accuracyLog;
   while (remaining > 0 && probabilities.length <= limits.maxSymbol) {
-    // Values that cannot occur any more make room for a code one bit shorter.
+    // Impossible values make some codes one bit shorter.
     const count = highestBit(remaining + 1) + 1;
     const short = peek(count - 1);
     const shortValues = (1 << count) - 2 - remaining;

@@ -24,7 +24,7 @@ export function readHuffmanTable(bytes: Uint8Array, start: number, end: number):
   return { table: buildHuffmanTable(weights, start), next };
 }
 
-/** Weights in a finite-state code, with two states that take turns until the bits run out. */
+/** Weights in a finite-state code, with two alternating states until the bits run out. */
 function readCodedWeights(bytes: Uint8Array, start: number, end: number): number[] {
   const { table, next } = readFseTable(bytes, start, end, { maxAccuracyLog: 6, maxSymbol: 255 });
   const bits = new BackwardBits(bytes, next, end);

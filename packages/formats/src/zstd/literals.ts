@@ -1,14 +1,14 @@
 import { decodeHuffmanStream, readHuffmanTable, type HuffmanTable } from './huffman.js';
 import { ZstdError } from './bits.js';
 
-/** Largest content of a block; literals cannot be more. */
+/** Maximum content of a block, which also limits literals. */
 export const MAX_BLOCK = 131_072;
 
 export interface Literals {
   readonly content: Uint8Array;
-  /** Byte after the literals section. */
+  /** Offset after the literals section. */
   readonly next: number;
-  /** The prefix code that a later block may use again. */
+  /** The prefix code that a later block may reuse. */
   readonly table: HuffmanTable | undefined;
 }
 

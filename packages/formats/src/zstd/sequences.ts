@@ -1,12 +1,12 @@
 import { BackwardBits, ZstdError } from './bits.js';
 import { buildFseTable, readFseTable, singleSymbolTable, type FseTable } from './fse.js';
 
-/** Tables of literal lengths, offsets and match lengths, in the order in which a block describes them. */
+/** Tables of literal lengths, offsets and match lengths, in the order of a block's description. */
 export type SequenceTables = readonly [FseTable, FseTable, FseTable];
 
 const range = (length: number, value: (k: number) => number): number[] => Array.from({ length }, (_, k) => value(k));
 
-/** Additional bits of each code, and the smallest value of each (RFC 8878, 3.1.1.3.2.1). */
+/** Additional bits of each code, and the base value of each (RFC 8878, 3.1.1.3.2.1). */
 const LITERAL_BITS = [...range(16, () => 0), 1, 1, 1, 1, 2, 2, 3, 3, 4, ...range(11, (k) => k + 6)];
 const MATCH_BITS = [...range(32, () => 0), 1, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, ...range(10, (k) => k + 7)];
 const LITERAL_BASE = baseValues(LITERAL_BITS, 0);
@@ -21,7 +21,7 @@ function baseValues(bits: readonly number[], first: number): number[] {
   });
 }
 
-/** What a block may say of its three codes, and the distributions that hold where it says nothing. */
+/** Limits of the three codes, and their predefined distributions. */
 const CODES = [
   {
     limits: { maxAccuracyLog: 9, maxSymbol: 35 },
@@ -43,16 +43,16 @@ const CODES = [
   },
 ] as const;
 
-/** Where decoded content goes, and the offsets that sequences may repeat. */
+/** Destination of decoded content, and the repeatable offsets of sequences. */
 export interface Output {
   readonly bytes: Uint8Array;
-  /** Byte where the frame began: matches reach back no farther. */
+  /** Offset of the frame's start: matches cannot refer to earlier bytes. */
   frameStart: number;
   position: number;
   readonly repeatedOffsets: [number, number, number];
 }
 
-/** Reads the sequences section of a block and carries it out; returns the tables that a later block may use again. */
+/** Reads and executes the sequences section of a block; returns the tables that a later block may reuse. */
 export function executeSequences(
   bytes: Uint8Array,
   start: number,
@@ -109,7 +109,7 @@ function readTables(
   return { tables: [tables[0], tables[1], tables[2]], next: at };
 }
 
-/** Copies literals and matches in turn; returns the number of literals used. */
+/** Copies literals and matches alternately; returns the number of literals used. */
 function runSequences(
   bits: BackwardBits,
   count: number,
@@ -143,7 +143,7 @@ function runSequences(
   return used;
 }
 
-/** The offset that a value means: a new one, or one of the last three (RFC 8878, 3.1.1.5), which it updates. */
+/** The offset of a value: a new one, or one of the last three (RFC 8878, 3.1.1.5), which it updates. */
 function nextOffset(recent: Output['repeatedOffsets'], value: number, literalLength: number): number {
   const index = value > 3 ? 3 : value - (literalLength === 0 ? 0 : 1);
   const offset = value > 3 ? value - 3 : index === 3 ? recent[0] - 1 : recent[index];

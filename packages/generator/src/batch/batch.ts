@@ -6,8 +6,8 @@ import { groupInstances, inputsOfInstances, stackInputs } from './stack-inputs.j
 import { StepSessions } from './step-sessions.js';
 
 /**
- * Fulfils when the task that runs now has ended. All callbacks of one animation frame are one task: whatever the elements of a page ask for
- * in a frame has then been asked. A timer would do as well, but browsers hold timers back.
+ * Resolves at the end of the current task. All callbacks of one animation frame are one task, so by then the elements
+ * of a page have made all requests of the frame. A message is used because browsers throttle timers.
  */
 export function endOfTask(): Promise<void> {
   return new Promise((resolve) => {
@@ -20,25 +20,28 @@ export function endOfTask(): Promise<void> {
   });
 }
 
-/** What an instance asks for. */
+/** Latest request of an instance. */
 interface RunRequest {
   readonly inputs: Inputs;
 }
 
-/** One instance, as a batch sees it. */
+/** One instance of a batch. */
 export interface BatchMember<W extends RunRequest> {
-  /** Whether there is anything to do for a wish. */
+  /** Whether a request requires a run. */
   readonly isDue: (request: W) => boolean;
-  /** Takes what a run wrote; `instance` says which of its instances is this one. It must submit its work before it returns. */
+  /**
+   * Consumes the output of a run; `instance` is the index of this instance in it. It must submit its work before it
+   * returns.
+   */
   readonly take: (request: W, outputs: RunOutputs, instance: number) => void;
-  /** The run is submitted; it started at `start`, as `performance.now()` has it. */
+  /** Called when the run is submitted; `start` is its start time by `performance.now()`. */
   readonly onTaken: (request: W, start: number) => void;
   readonly onError: (error: unknown) => void;
 }
 
 const batches = new WeakMap<GeneratorSession, Batch>();
 
-/** The batch of all instances of a session. @param session of a model that declares instances */
+/** The batch of all instances of a session. @param session Its model declares instances. */
 export function batchOf(session: GeneratorSession): Batch {
   let batch = batches.get(session);
   if (batch === undefined) batches.set(session, (batch = new Batch(session)));
@@ -46,8 +49,9 @@ export function batchOf(session: GeneratorSession): Batch {
 }
 
 /**
- * All instances of one generator on one device: those that ask within a task run together, each with its own inputs, and each gets its slice
- * of what the run writes. The latest wish of each wins, and there is one loop for all, so that they stay together.
+ * All instances of one generator on one device: requests within a task run together, each instance with its own inputs,
+ * and each gets its slice of the output. The latest request of each instance wins, and a single loop keeps them
+ * together.
  */
 export class Batch {
   readonly #session: GeneratorSession;
@@ -69,7 +73,7 @@ export class Batch {
     });
   }
 
-  /** How it runs; undefined before the first run. */
+  /** Session kind; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#steps.kind;
   }
@@ -88,7 +92,7 @@ export class Batch {
     this.#seats.delete(seat);
     if (this.#seats.size > 0) return;
     this.#loop.close();
-    // Whoever comes next begins anew.
+    // The next instance starts a new batch.
     if (batches.get(this.#session) === this) batches.delete(this.#session);
     void this.#loop.idle.then(() => this.#steps.release());
   }
@@ -127,7 +131,7 @@ export class Batch {
           try {
             seat.member.take(request, outputs, instance);
           } catch (error) {
-            // What one cannot take is nothing to the others.
+            // The failure of one instance does not affect the others.
             fail(seat, error);
           }
         });
@@ -139,7 +143,7 @@ export class Batch {
   }
 }
 
-/** The place of one instance in a batch; asked like a {@link RunLoop} of its own. */
+/** One instance in a batch, with the interface of a {@link RunLoop}. */
 export class Seat<W extends RunRequest> {
   readonly member: BatchMember<W>;
   readonly #batch: Batch;
@@ -148,7 +152,7 @@ export class Seat<W extends RunRequest> {
   #taken: W | undefined;
   #isRunning = false;
   #isClosed = false;
-  /** Told when nothing is on its way. */
+  /** Resolvers to call when no run is in progress. */
   #waiting: (() => void)[] = [];
 
   constructor(batch: Batch, member: BatchMember<W>, calls: { readonly ask: () => void; readonly leave: () => void }) {
@@ -161,34 +165,34 @@ export class Seat<W extends RunRequest> {
     return this.#isClosed;
   }
 
-  /** How the batch runs; undefined before its first run. */
+  /** Session kind of the batch; undefined before its first run. */
   get kind(): SessionKind | undefined {
     return this.#batch.kind;
   }
 
-  /** Fulfils, and never rejects, when no run for this instance is on its way; the others of its batch may go on for ever. */
+  /** Resolves, and never rejects, when no run for this instance is in progress; runs of other instances may continue. */
   get idle(): Promise<void> {
     return this.#isBusy ? new Promise((resolve) => this.#waiting.push(resolve)) : Promise.resolve();
   }
 
-  /** True if there is a wish, and anything to do for it. */
+  /** Whether there is a request that requires a run. */
   get isDue(): boolean {
     return this.#request !== undefined && this.member.isDue(this.#request);
   }
 
-  /** Inputs of the wish that was taken last. */
+  /** Inputs of the last request taken. */
   get inputs(): Inputs {
     return this.#taken?.inputs ?? {};
   }
 
-  /** Returns at once; a wish that has not started yet is replaced. */
+  /** Returns at once; a request that has not started yet is replaced. */
   request(request: W): void {
     if (this.#isClosed) return;
     this.#request = request;
     this.#calls.ask();
   }
 
-  /** The run of what it returns is on its way until {@link settle}. */
+  /** Takes the request; its run is in progress until {@link settle}. */
   takeRequest(): W | undefined {
     this.#taken = this.#request;
     this.#request = undefined;
@@ -196,7 +200,7 @@ export class Seat<W extends RunRequest> {
     return this.#taken;
   }
 
-  /** The run for the wish that was taken has ended. */
+  /** Marks the end of the run of the taken request. */
   settle(): void {
     this.#isRunning = false;
     if (this.#isBusy) return;

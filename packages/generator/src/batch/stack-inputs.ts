@@ -12,7 +12,7 @@ export function sharedInputs(inputs: Inputs, varying: ReadonlySet<string>): Inpu
   return Object.fromEntries(Object.entries(inputs).filter(([name]) => !varying.has(name)));
 }
 
-/** Instances that may run together: those whose shared inputs are the same, at most `most` of them, in their order. */
+/** Groups instances that may run together: those with equal shared inputs, at most `most` of them, in order. */
 export function groupInstances<T extends { readonly inputs: Inputs }>(
   instances: readonly T[],
   varying: ReadonlySet<string>,
@@ -29,10 +29,10 @@ export function groupInstances<T extends { readonly inputs: Inputs }>(
 }
 
 /**
- * Inputs of several instances as those of one run.
- * @param instances values as `bindInputs` makes them, at least one set of them, with the same shared inputs.
- * @param varying names of the inputs that get a row for each instance; all others are taken from the first.
- * @param count rows to make: where it is more than there are instances, the last one is repeated, and what it writes is not used.
+ * Stacks the inputs of several instances for one run.
+ * @param instances Values from `bindInputs`, at least one set of them, with the same shared inputs.
+ * @param varying Names of the inputs that get a row for each instance; all others are taken from the first.
+ * @param count Number of rows: if it exceeds the instances, the last one is repeated, and its output is ignored.
  */
 export function stackInputs(
   instances: readonly Inputs[],

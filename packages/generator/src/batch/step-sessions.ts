@@ -1,7 +1,7 @@
 import type { GeneratorSession } from '../runtime/generator-session.js';
 import type { SessionKind } from '../runtime/live-session.js';
 
-/** Runs after which the session of a number of instances that has not been needed since is let go. */
+/** Number of runs after which an unused session for a number of instances is released. */
 const RUNS_UNTIL_RELEASE = 300;
 
 interface Step {
@@ -10,8 +10,8 @@ interface Step {
 }
 
 /**
- * Instances that a session for so many computes: 1, 2, 4, 6, 8, 12, 16, 24, 32 ... Those beyond what was asked for are computed in vain, a third
- * of them at most.
+ * Number of instances that a session computes: 1, 2, 4, 6, 8, 12, 16, 24, 32 ... The excess, at most a third, is
+ * wasted.
  */
 export function stepOf(instances: number): number {
   const whole = 2 ** Math.ceil(Math.log2(instances));
@@ -20,11 +20,11 @@ export function stepOf(instances: number): number {
 }
 
 /**
- * Sessions of one model, one for each {@link stepOf} the instances. Recorded commands have fixed shapes, so there is one for each step; an instance
- * that comes or goes mostly stays within it.
+ * Sessions of one model, one for each {@link stepOf} the instances. Graph capture needs fixed shapes, so each step has
+ * its own session; adding or removing an instance mostly stays within a step.
  */
 export class StepSessions {
-  /** Most instances of one run: what the contract and the device's buffers allow. */
+  /** Maximum number of instances in one run: limited by the contract and the device's buffers. */
   readonly most: number;
   readonly #session: GeneratorSession;
   readonly #steps = new Map<number, Step>();
@@ -39,12 +39,12 @@ export class StepSessions {
     this.most = Math.max(1, Math.min(contract.instances!.most, room));
   }
 
-  /** How the last run ran; undefined before. */
+  /** Session kind of the last run; undefined before. */
   get kind(): SessionKind | undefined {
     return [...this.#steps.values()].sort((a, b) => b.lastUse - a.lastUse)[0]?.session.kind ?? this.#kind;
   }
 
-  /** The session for so many instances, and how many it computes: as many or more. */
+  /** Returns the session for at least this many instances, and the number that it computes. */
   sessionFor(instances: number): { readonly session: GeneratorSession; readonly count: number } {
     const count = Math.min(this.most, stepOf(instances));
     let step = this.#steps.get(count);

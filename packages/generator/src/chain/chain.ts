@@ -11,14 +11,14 @@ import { connect } from './connect.js';
 import { HandOver } from './hand-over.js';
 import { StateOf } from './state-of.js';
 
-/** One model, or several of which each takes what the one before it writes. */
+/** One model, or several in a chain whose outputs feed the next model. */
 export class Chain {
   readonly device: GPUDevice;
   readonly #leases: readonly SessionLease[];
   readonly #handOvers: readonly HandOver[];
-  /** What each model keeps from run to run; undefined where it keeps nothing. */
+  /** State of each model between runs; undefined for a model without state. */
   readonly #states: readonly (StateOf | undefined)[];
-  /** Inputs of the page that each model ran with last; undefined where what it wrote last is not to be relied on. */
+  /** Page inputs of each model's last run; undefined if its last output is invalid. */
   readonly #ran: (Inputs | undefined)[] = [];
   readonly #endProgress: () => void;
 
@@ -34,8 +34,8 @@ export class Chain {
   }
 
   /**
-   * Fetches all models and checks them, each and as a chain; not a byte of the runtime is fetched yet.
-   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` if they do not fit one another.
+   * Fetches all models and checks them, individually and as a chain; the runtime is not fetched yet.
+   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` if they do not match.
    */
   static async open(
     sources: ModelSource | readonly ModelSource[],
@@ -47,7 +47,7 @@ export class Chain {
     const endProgress = watchRuntimeBytes(reports[list.length]);
     const opening = list.map(async (source, i) => {
       const lease = await acquireSession(source, device, { ...options, onProgress: reports[i] });
-      // Another generator may have fetched it, or be about to.
+      // Another generator may have fetched it, or be fetching it.
       const { bytes, externalData } = lease.session.model;
       const size = externalData.reduce((sum, { data }) => sum + data.length, bytes.length);
       reports[i](size, size);
@@ -62,18 +62,18 @@ export class Chain {
     }
   }
 
-  /** The session of a single model that computes several instances in one run; undefined for all others. */
+  /** Session of a single model that computes several instances in one run; undefined for all others. */
   get ofInstances(): GeneratorSession | undefined {
     const [{ session }] = this.#leases;
     return session.model.contract.instances && session;
   }
 
-  /** In the order in which they run. */
+  /** Models in execution order. */
   get models(): readonly GeneratorModel[] {
     return this.#leases.map(({ session }) => session.model);
   }
 
-  /** How it runs, by its slowest model; undefined before the first run. */
+  /** Session kind of the slowest model; undefined before the first run. */
   get kind(): SessionKind | undefined {
     const kinds = this.#leases.map(({ session }) => session.kind);
     return SLOWEST_FIRST.find((kind) => kinds.includes(kind));
@@ -84,13 +84,13 @@ export class Chain {
     return this.#leases.map(({ session }, i) => session.bind(state, this.#handOvers[i - 1]?.inputs));
   }
 
-  /** Models that keep a state begin anew. */
+  /** Resets the state of all models. */
   restart(): void {
     for (const state of this.#states) state?.reset();
   }
 
   /**
-   * Runs what the change of inputs asks for: a model whose inputs are those of its last run, and those before it, are left out.
+   * Runs the models that a change of inputs affects: leading models with the inputs of their last run are skipped.
    * @throws as `GeneratorSession.run`.
    */
   async run(inputs: readonly Inputs[], use: (outputs: RunOutputs) => void): Promise<void> {
@@ -110,12 +110,15 @@ export class Chain {
     }
   }
 
-  /** What its models wrote is not to be relied on any more: the next run asks all of them. */
+  /** Invalidates the outputs of its models: the next run executes all of them. */
   forget(): void {
     this.#ran.length = 0;
   }
 
-  /** Gives its models back. @param idle fulfils when the last run has ended: until then it may read what was handed over */
+  /**
+   * Releases its models. @param idle Resolves when the last run has ended, which may read the intermediate tensors
+   * until then.
+   */
   release(idle: Promise<void> = Promise.resolve()): void {
     this.#endProgress();
     for (const { release } of this.#leases) release();
@@ -129,7 +132,7 @@ export class Chain {
 
 const SLOWEST_FIRST: readonly SessionKind[] = ['wasm', 'webgpu', 'captured'];
 
-/** The first of a chain must not wait for another model. */
+/** The first model of a chain must not depend on another model. */
 function requireNoneBefore({ header, contract }: GeneratorModel): void {
   const faults = header.inputs
     .filter(({ name }) => contract.inputs[name].role === 'gaussians')
@@ -146,7 +149,7 @@ function requireNoneBefore({ header, contract }: GeneratorModel): void {
   if (faults.length > 0) throw new ContractError(faults);
 }
 
-/** What one model hands to the next is one instance's. */
+/** Intermediate tensors of a chain are those of one instance. */
 function requireNoInstances(models: readonly GeneratorModel[]): void {
   const faults = models
     .filter(({ contract }) => contract.instances !== undefined)
@@ -163,5 +166,5 @@ function requireNoInstances(models: readonly GeneratorModel[]): void {
 }
 
 function ignore(): void {
-  // The failure that matters has been thrown already.
+  // The relevant failure has already been thrown.
 }

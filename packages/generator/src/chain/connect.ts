@@ -7,15 +7,15 @@ import {
 import { describeTensor, type OnnxTensor } from '@gaussian-splat/core/onnx';
 import type { GeneratorModel } from '../runtime/open-model.js';
 
-/** An output of one model that is an input of the next; without an output the input is told the number of rows. */
+/** An output of one model that feeds an input of the next; without an output the input receives the number of rows. */
 export interface Connection {
   readonly output: string | undefined;
   readonly input: string;
 }
 
 /**
- * Which outputs of a model feed which inputs of the one after it. Tensors are handed on as they are: layout, activations, orders and
- * element type must be the same.
+ * Matches the outputs of a model with the inputs of the next. Tensors are passed unchanged: layout, activations, orders
+ * and element type must be the same.
  * @throws ContractError `contract/chain`, with every fault.
  */
 export function connect(before: GeneratorModel, after: GeneratorModel): Connection[] {
@@ -38,7 +38,7 @@ export function connect(before: GeneratorModel, after: GeneratorModel): Connecti
 
 type Found = { readonly output: string | undefined } | { readonly misfit: string };
 
-/** The tensor of Gaussians that an input asks for. */
+/** The tensor of Gaussians for an input. */
 function gaussiansFor({ layout, contract }: GeneratorModel, wanted: GaussiansInput): Found {
   const { outputs } = contract;
   if (wanted.attribute === 'count') return { output: layout?.count };
@@ -73,7 +73,7 @@ function activationMisfit(slice: AttributeSlice, wanted: GaussiansInput): string
   return `${attribute} as ${written[attribute]}, not ${asked[attribute]}`;
 }
 
-/** Sizes that are numbers on both sides must agree; a fixed input cannot take what may change. */
+/** Fixed sizes on both sides must agree; a fixed input cannot receive a variable size. */
 function shapeMisfit({ header }: GeneratorModel, output: string | undefined, input: OnnxTensor): string | undefined {
   const tensor = header.outputs.find(({ name }) => name === output);
   if (tensor === undefined) return undefined;
@@ -104,7 +104,7 @@ const takesNothing = (before: GeneratorModel, after: GeneratorModel, role: strin
   remedy: 'put models into a chain in the order in which they feed one another',
 });
 
-/** Rows behind the live count may hold anything: whoever takes the rows must know where they end. */
+/** Rows after the live count are undefined, so the next model needs the count. */
 function lostCount(
   before: GeneratorModel,
   after: GeneratorModel,

@@ -6,7 +6,10 @@ import type { RunOutputs } from '../runtime/live-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
 import type { Connection } from './connect.js';
 
-/** What lies between two models of a chain, or two runs of one model: the first one's outputs, kept on the GPU until the second has run. */
+/**
+ * Tensors between two models of a chain, or two runs of one model: the first one's outputs, kept on the GPU until the
+ * second has run.
+ */
 export class HandOver {
   readonly #device: GPUDevice;
   readonly #model: GeneratorModel;
@@ -16,19 +19,19 @@ export class HandOver {
   #rows = 0;
   #version = 0;
 
-  /** @param model the first of the two */
+  /** @param model The first of the two. */
   constructor(device: GPUDevice, model: GeneratorModel, connections: readonly Connection[]) {
     this.#device = device;
     this.#model = model;
     this.#connections = connections;
   }
 
-  /** Inputs of the second model that need no value of the page. */
+  /** Inputs of the second model that are not set by the page. */
   get inputs(): ReadonlySet<string> {
     return new Set(this.#connections.map(({ input }) => input));
   }
 
-  /** What the first has written last. */
+  /** Last outputs of the first model. */
   get tensors(): Inputs {
     return this.#tensors;
   }
@@ -39,8 +42,8 @@ export class HandOver {
   }
 
   /**
-   * Copies what the first model wrote; the runtime's buffers are good for this moment only.
-   * @throws ContractError `contract/rows` if it is more than the model declares. What was taken before stays.
+   * Copies the output of the first model, because the runtime reuses its buffers.
+   * @throws ContractError `contract/rows` if it exceeds the declared size. The previous content remains.
    */
   take({ tensors, dims, rows }: RunOutputs): void {
     const { layout, header } = this.#model;
@@ -61,7 +64,7 @@ export class HandOver {
     this.#tensors = taken;
   }
 
-  /** Until the first has run, a tensor has one number in every place. */
+  /** Before the first run, a tensor is filled with one number. */
   fill(input: string, { dtype, dims }: Pick<GpuTensor, 'dtype' | 'dims'>, value: number): void {
     const length = elementsOf(dims);
     const buffer = this.#bufferOf(input, bufferBytes(dtype, length));
@@ -77,7 +80,7 @@ export class HandOver {
 
   #shaped(input: string, output: string, dims: readonly number[]): GpuTensor {
     const { dtype: written, most } = this.#model.outputs.find(({ name }) => name === output)!;
-    // A count of 64 bits feeds no input: `connect` wants the same type on both sides.
+    // A 64-bit count feeds no input: `connect` requires the same type on both sides.
     const dtype = written as GpuTensor['dtype'];
     const buffer = this.#bufferOf(input, bufferBytes(dtype, most ?? elementsOf(dims)));
     return { buffer, dtype, dims, version: this.#version };
@@ -99,7 +102,7 @@ export class HandOver {
   }
 }
 
-/** A number in each place of a word. */
+/** Replicates a number over a word. */
 function wordOf(dtype: GpuTensor['dtype'], value: number): number {
   if (dtype === 'float16') return numberToHalf(value) * 0x1_0001;
   const Numbers = dtype === 'int32' ? Int32Array : Float32Array;

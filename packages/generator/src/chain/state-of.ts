@@ -4,7 +4,7 @@ import type { RunOutputs } from '../runtime/live-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
 import { HandOver } from './hand-over.js';
 
-/** What one model keeps from run to run: outputs that its next run takes. */
+/** State of one model between runs: outputs that feed its next run. */
 export class StateOf {
   readonly #model: GeneratorModel;
   readonly #kept: HandOver;
@@ -16,17 +16,17 @@ export class StateOf {
     this.reset();
   }
 
-  /** Undefined for a model that keeps nothing. */
+  /** Undefined for a model without state. */
   static of(model: GeneratorModel, device: GPUDevice): StateOf | undefined {
     return statesOf(model).length > 0 ? new StateOf(model, device) : undefined;
   }
 
-  /** As of the last run. */
+  /** Outputs of the last run. */
   get tensors(): Inputs {
     return this.#kept.tensors;
   }
 
-  /** The next run is the first. */
+  /** Resets to the initial state. */
   reset(): void {
     const { header } = this.#model;
     for (const [name, { default: value = 0 }] of statesOf(this.#model)) {
@@ -35,7 +35,7 @@ export class StateOf {
     }
   }
 
-  /** Copies what a run wrote for the next one. */
+  /** Copies the outputs of a run for the next one. */
   take(outputs: RunOutputs): void {
     this.#kept.take(outputs);
   }

@@ -1,39 +1,39 @@
 import { halfToNumber } from '@gaussian-splat/core';
 import type { AttributeSlice } from '@gaussian-splat/core/contract';
 
-/** A piece of an output that the same run wrote in two places. */
+/** A range of an output from the same run on GPU and CPU. */
 export interface ComparedPart {
   /** Name of the output. */
   readonly tensor: string;
   readonly dtype: 'float32' | 'float16' | 'int32';
-  /** Elements of the output before this piece. */
+  /** Offset of this range in the output, in elements. */
   readonly start: number;
   readonly found: Uint8Array;
   readonly expected: Uint8Array;
 }
 
 export interface Comparison {
-  /** Largest difference of one attribute, as a share of its largest value. */
+  /** Largest difference of one attribute, as a fraction of its largest value. */
   readonly error: number;
-  /** Where that is: an attribute, or a tensor. */
+  /** The attribute or tensor with that difference. */
   readonly where: string;
-  /** Share of that attribute's numbers that differ by more than is allowed. */
+  /** Fraction of that attribute's numbers whose difference exceeds the tolerance. */
   readonly share: number;
 }
 
-/** Differences beyond these are another result: kernels round otherwise, and SwiftShader's sines are right to 2e-4. */
+/** Tolerances: kernels round differently, and SwiftShader's sines are accurate to 2e-4. */
 export const ALLOWED = { float32: 1e-3, float16: 8e-3, int32: 0 } as const;
-/** What may differ all the same: a row on the edge of a threshold falls to either side of it. */
+/** Fraction of numbers that may still differ, because a row at a threshold may fall to either side of it. */
 export const ALLOWED_SHARE = 1e-3;
 
-/** True where the two results cannot be roundings of one. */
+/** Whether the two results differ by more than rounding. */
 export const isDifferent = ({ share }: Comparison): boolean => share > ALLOWED_SHARE;
 
 /**
- * Compares pieces of what a run wrote with what it should have written, attribute by attribute: a covariance is small beside a centre, and must
- * be right, too.
- * @param attributes where Gaussians lie in the outputs; none for an image.
- * @returns the attribute that is worst.
+ * Compares ranges of a run's output with the expected ones, attribute by attribute, because a small attribute such as a
+ * covariance must be accurate, too.
+ * @param attributes Location of the Gaussians in the outputs; none for an image.
+ * @returns The attribute with the largest error.
  */
 export function compareParts(parts: readonly ComparedPart[], attributes: readonly AttributeSlice[] = []): Comparison {
   const comparisons = [...new Set(parts.map(({ tensor }) => tensor))].flatMap((tensor) => {
@@ -74,7 +74,7 @@ function differenceOf(found: number, expected: number): number {
 
 const sigmoid = (logit: number): number => 1 / (1 + Math.exp(-logit));
 
-/** The numbers of an attribute in a piece, found and expected. */
+/** The numbers of an attribute in a range, found and expected. */
 function pairsOf(
   { dtype, start, found, expected }: ComparedPart,
   slice: AttributeSlice | undefined,
@@ -86,7 +86,7 @@ function pairsOf(
       const column = (start + i) % slice.rowStride;
       if (column < slice.offset || column >= slice.offset + slice.components) continue;
     }
-    // Logits of 20 and 30 are the same opacity.
+    // Logits are compared as opacities, because 20 and 30 give the same.
     pairs.push(slice?.activation === 'logit' ? [sigmoid(a[i]), sigmoid(b[i])] : [a[i], b[i]]);
   }
   return pairs;

@@ -4,7 +4,7 @@ import { compareParts, isDifferent, type ComparedPart, type Comparison } from '.
 import { readRecord, recordKey, writeRecord, type Verdict } from './record.js';
 import { runInWorker, type CpuRun, type StartWorker } from './run-on-cpu.js';
 
-/** A run on the GPU, with pieces of what it wrote. */
+/** A run on the GPU, with ranges of its output. */
 export interface Evidence {
   readonly feeds: CpuRun['feeds'];
   readonly dims: Readonly<Record<string, readonly number[]>>;
@@ -14,10 +14,10 @@ export interface Evidence {
   })[];
 }
 
-/** Bytes of weights and outputs up to which a model is compared: a worker holds them a second time. */
+/** Maximum bytes of weights and outputs of a compared model, because a worker holds a second copy. */
 const MOST_BYTES = 512 * 2 ** 20;
 
-/** What draws random numbers of its own cannot be compared. */
+/** Operators that draw random numbers, which cannot be compared. */
 const IS_RANDOM = /^(Random|Bernoulli|Multinomial)/;
 
 interface Known {
@@ -25,7 +25,7 @@ interface Known {
   verdict: Promise<Verdict> | undefined;
 }
 
-/** By the bytes of a model: its sessions for other numbers of instances are the same computation. */
+/** Keyed by the bytes of a model, because its sessions for other numbers of instances run the same computation. */
 const known = new WeakMap<GPUDevice, WeakMap<Uint8Array, Known>>();
 
 function knownOf(model: GeneratorModel, device: GPUDevice): Known {
@@ -39,7 +39,7 @@ function knownOf(model: GeneratorModel, device: GPUDevice): Known {
   return entry;
 }
 
-/** The verdict of an earlier visit or session, if there is one. */
+/** Returns the result of an earlier visit or session, if there is one. */
 export async function earlierVerdict(model: GeneratorModel, device: GPUDevice): Promise<Verdict | undefined> {
   const entry = knownOf(model, device);
   const kept = readRecord(await entry.key);
@@ -48,8 +48,8 @@ export async function earlierVerdict(model: GeneratorModel, device: GPUDevice): 
 }
 
 /**
- * Compares what a model's first run wrote on the GPU with what the same run writes on the CPU. It waits until the page is idle, and runs in a
- * worker. Never rejects.
+ * Compares the output of a model's first run on the GPU with that of the same run on the CPU. Waits until the page is
+ * idle, and runs in a worker. Never rejects.
  */
 export function prove(
   model: GeneratorModel,
@@ -100,7 +100,7 @@ async function compare(
     startWorker,
   );
   for (const [name, dims] of Object.entries(outputs.dims)) {
-    // A row more or less is a threshold, not another result; but then nothing lies where it lay.
+    // A different number of rows results from a threshold and is not an error, but the rows cannot be compared.
     if (String(dims) !== String(evidence.dims[name]))
       return unknown(`it writes ${String(dims)} there, not ${String(evidence.dims[name])}`);
   }
@@ -128,7 +128,7 @@ function bytesOf({ bytes, externalData, outputs }: GeneratorModel): number {
   return outputs.reduce((sum, { most = 0, dtype }) => sum + most * (dtype === 'float16' ? 2 : 4), weights);
 }
 
-/** When the page has nothing else to do, or after two seconds. */
+/** Waits for the page to be idle, at most two seconds. */
 function idle(): Promise<unknown> {
   return new Promise((resolve) => {
     if (typeof requestIdleCallback === 'function') requestIdleCallback(resolve, { timeout: 2000 });

@@ -1,19 +1,22 @@
 import type { GeneratorModel } from '../runtime/open-model.js';
 
-/** What comparing a model's run on the GPU with its run on the CPU has shown. */
+/** Result of comparing a model's run on the GPU with its run on the CPU. */
 export interface Verdict {
-  /** `unknown` where there was nothing to compare with. */
+  /** `unknown` if there was nothing to compare with. */
   readonly result: 'same' | 'different' | 'unknown';
-  /** Largest difference, as a share of the largest value of what differs most; absent where nothing was compared. */
+  /**
+   * Largest difference, as a fraction of the largest value of the least accurate attribute; absent if nothing was
+   * compared.
+   */
   readonly error?: number;
-  /** For readers, without a full stop. */
+  /** For display, without a full stop. */
   readonly reason: string;
 }
 
-/** Changes with the version of the runtime, and with what counts as different. */
+/** Depends on the version of the runtime, and on the tolerances. */
 const VERSION = 'ort 1.30.0, 1';
 
-/** What a verdict is kept under: the bytes of the model, and the adapter. Undefined where a page may not digest. */
+/** Storage key of a result: the bytes of the model, and the adapter. Undefined if the page cannot compute digests. */
 export async function recordKey(
   { bytes, externalData }: GeneratorModel,
   device: GPUDevice,
@@ -29,7 +32,7 @@ export async function recordKey(
   return `gaussian-splat proof ${VERSION} ${[vendor, architecture, model, description].join(' ')} ${hex.join('')}`;
 }
 
-/** The verdict of an earlier visit. */
+/** Returns the result of an earlier visit. */
 export function readRecord(key: string | undefined): Verdict | undefined {
   try {
     const verdict = JSON.parse(pageStore()?.getItem(key ?? '') ?? 'null') as Verdict | null;
@@ -44,9 +47,9 @@ export function writeRecord(key: string | undefined, verdict: Verdict): void {
   try {
     if (key !== undefined) pageStore()?.setItem(key, JSON.stringify(verdict));
   } catch {
-    // A full or forbidden store costs the next visit a comparison of its own.
+    // If the storage is full or forbidden, the next visit compares again.
   }
 }
 
-/** Reading it may throw: a page may be denied its storage. */
+/** Access may throw, because a page may be denied its storage. */
 const pageStore = (): Storage | undefined => (globalThis as { localStorage?: Storage }).localStorage;

@@ -1,6 +1,6 @@
 import type { Ort, RuntimeSource } from '../runtime/load-runtime.js';
 
-/** A run of a model, with everything that a worker needs. */
+/** Inputs of a worker that runs a model. */
 export interface CpuRun {
   readonly model: Uint8Array;
   readonly externalData: readonly { readonly path: string; readonly data: Uint8Array }[];
@@ -8,20 +8,20 @@ export interface CpuRun {
   readonly feeds: Readonly<
     Record<string, { readonly dtype: string; readonly dims: readonly number[]; readonly data: ArrayBufferView }>
   >;
-  /** Pieces of outputs that are wanted, in bytes. */
+  /** Requested ranges of outputs, in bytes. */
   readonly parts: readonly { readonly tensor: string; readonly offset: number; readonly size: number }[];
 }
 
 export interface CpuOutputs {
   readonly dims: Readonly<Record<string, readonly number[]>>;
-  /** As they were asked for. */
+  /** In the requested order. */
   readonly parts: readonly Uint8Array[];
 }
 
-/** Longest that a run may take, start of the runtime included, ms. */
+/** Time limit of a run, including the start of the runtime, ms. */
 const LIMIT_MS = 60_000;
 
-/** What a worker of {@link StartWorker} is sent. */
+/** Message to a worker of {@link StartWorker}. */
 export interface CpuRunMessage {
   readonly type: 'run-on-cpu';
   readonly script: string;
@@ -32,14 +32,15 @@ export interface CpuRunMessage {
 type Answer = { readonly type: 'ran-on-cpu'; readonly outputs?: CpuOutputs; readonly failure?: string };
 
 /**
- * Starts a worker that calls {@link answerCpuRun} for messages of type `run-on-cpu`. For pages whose Content-Security-Policy has no `blob:` in
- * `worker-src`, or whose Trusted Types let only named policies make the address of a script.
+ * Starts a worker that calls {@link handleCpuRun} for messages of type `run-on-cpu`. For pages whose
+ * Content-Security-Policy has no `blob:` in `worker-src`, or whose Trusted Types require named policies for script
+ * addresses.
  */
 export type StartWorker = () => Worker;
 
 /**
- * The worker's side: runs the model, and posts what it wrote. It uses nothing but its arguments, for its text is the script of workers that
- * this package starts itself.
+ * Runs in the worker: executes the model, and posts its output. It uses only its arguments, because its source text is
+ * the script of the default worker.
  */
 export async function answerCpuRun({ script, wasm, run }: CpuRunMessage): Promise<void> {
   const post = postMessage as (answer: Answer, transfer?: Transferable[]) => void;
@@ -51,7 +52,7 @@ export async function answerCpuRun({ script, wasm, run }: CpuRunMessage): Promis
     const { externalData, freeDimensionOverrides } = run;
     const session = await ort.InferenceSession.create(run.model, {
       executionProviders: ['wasm'],
-      // As the file says it: fusions have computed something else.
+      // Without fusions, because some compute wrong results.
       graphOptimizationLevel: 'basic',
       logSeverityLevel: 4,
       externalData,
@@ -73,22 +74,22 @@ export async function answerCpuRun({ script, wasm, run }: CpuRunMessage): Promis
   }
 }
 
-/** A worker of any page's own origin; bundlers need not know of it. */
+/** A same-origin worker that needs no support by bundlers. */
 function startOwnWorker(): Worker {
   const text = `onmessage = ({ data }) => (${String(answerCpuRun)})(data);`;
   const url = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
   try {
     return new Worker(url);
   } finally {
-    // Its script has been asked for by then, or after a moment.
+    // The script has been requested by then.
     setTimeout(() => URL.revokeObjectURL(url), 10_000);
   }
 }
 
 /**
- * Runs a model once on the CPU, in a worker of its own with a copy of the runtime of its own, which both end with it: the page's thread, and
- * frames, do not notice.
- * @throws if no worker may be started here, it takes too long, or the model does not run.
+ * Runs a model once on the CPU, in a worker with its own copy of the runtime, which ends with it: the main thread and
+ * its frames are not affected.
+ * @throws if workers are not allowed, the time limit is exceeded, or the model fails.
  */
 export function runInWorker(
   { script, wasm }: RuntimeSource,

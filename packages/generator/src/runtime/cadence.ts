@@ -1,15 +1,18 @@
 import type { GeneratorModel } from './open-model.js';
 
 /**
- * How often a model has something new to compute: `once`, if it takes no input; `chosen`, if its inputs are images and what a person sets beside them;
- * `continuous`, if a clock, a camera, a pose or another model may change an input for each frame.
+ * Run frequency of a model: `once`, if it has no inputs; `chosen`, if its inputs are images and settings of a visitor;
+ * `continuous`, if a clock, a camera, a pose or another model may change an input in each frame.
  */
 export type Cadence = 'once' | 'chosen' | 'continuous';
 
-/** Inputs that change when a person chooses something else. */
+/** Inputs that change only when a visitor selects another value. */
 const CHOSEN: ReadonlySet<string> = new Set(['image', 'control', 'shape', 'seed']);
 
-/** The cadence of a model, from the roles of its inputs. A post-processor's image is a frame: it is continuous. */
+/**
+ * Returns the run frequency of a model from the roles of its inputs. A post-processor's image is a frame, so it is
+ * continuous.
+ */
 export function cadenceOf({ contract, layout }: Pick<GeneratorModel, 'contract' | 'layout'>): Cadence {
   const roles = Object.values(contract.inputs).map(({ role }) => role);
   if (layout === undefined) return 'continuous';
@@ -17,12 +20,12 @@ export function cadenceOf({ contract, layout }: Pick<GeneratorModel, 'contract' 
   return roles.includes('image') && roles.every((role) => CHOSEN.has(role)) ? 'chosen' : 'continuous';
 }
 
-/** Bytes of weights from which a session is released while nothing changes: less are not worth another start. */
+/** Minimum bytes of weights for releasing an unused session: smaller ones are not worth another start. */
 const LARGE_BYTES = 16 * 2 ** 20;
-/** From the last run until the release, ms. */
+/** Time from the last run until the release, ms. */
 const REST_MS = 5_000;
 
-/** Releases the session of a model that has nothing to compute, with its weights, when no run has followed the last one for a while. */
+/** Releases the session of an unused model, including its weights, some time after its last run. */
 export class WeightRelease {
   readonly #release: () => void;
   /** Undefined for a model that keeps its session. */

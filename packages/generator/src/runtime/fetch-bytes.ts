@@ -1,22 +1,23 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesOf, chunksOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 
-/** Hears how many bytes have arrived, and of how many; undefined while that is not known. */
+/** Called with the received bytes, and the total; undefined if that is unknown. */
 export type ProgressListener = (loaded: number, total: number | undefined) => void;
 
-/** How files are fetched. */
+/** Options of downloads. */
 export interface FetchOptions {
-  /** Which cookies are sent; default `same-origin`. */
+  /** Cookies policy; default `same-origin`. */
   readonly credentials?: RequestCredentials;
   readonly signal?: AbortSignal;
-  /** Bytes until now, and the number of all of them where the server tells, or it is expected. */
+  /** Called with the received bytes, and the total if the server declares it, or it is expected. */
   readonly onProgress?: ProgressListener;
-  /** Length of the file as far as it is known, in bytes: servers that compress do not tell it. */
+  /** Expected length of the file in bytes, because servers with compression do not declare it. */
   readonly expected?: number;
 }
 
 /**
- * A whole file, as patiently as scenes are fetched; undefined where the server says that there is none and `mayBeMissing` allows it.
+ * Fetches a whole file, with the same retries as scenes; undefined if the server reports that it is missing and
+ * `mayBeMissing` allows it.
  * @throws GaussianSplatError `network/unreachable`, `network/status`, `network/interrupted`; the reason of the signal.
  */
 export async function fetchBytes(
@@ -46,7 +47,7 @@ export async function fetchBytes(
   }
 }
 
-/** Room for a file of unknown length at first, and the most that a length is believed that has only been said, bytes. */
+/** Initial allocation for a file of unknown length, and the maximum for a declared length, bytes. */
 const FIRST_BYTES = 65_536;
 const MOST_AT_ONCE = 2 ** 28;
 
@@ -61,7 +62,7 @@ async function readBody(response: Response, { onProgress, expected }: FetchOptio
     if (end > bytes.length) bytes = grown(bytes, Math.max(end, 2 * bytes.length));
     bytes.set(chunk, loaded);
     loaded = end;
-    // A file that is longer than it was said to be ends somewhere behind what has arrived.
+    // The total of a file that is longer than declared grows with the received bytes.
     onProgress(loaded, total && Math.max(loaded, total));
   }
   return loaded === bytes.length ? bytes : bytes.slice(0, loaded);
@@ -73,7 +74,7 @@ function grown(bytes: Uint8Array, length: number): Uint8Array<ArrayBuffer> {
   return larger;
 }
 
-/** Listeners for each of several downloads that tell one of their sum. Its total is known once that of each is. */
+/** Returns listeners for several downloads that report their sum to one. The total is known once that of each is. */
 export function sumProgress(count: number, onProgress: ProgressListener): readonly ProgressListener[] {
   const downloads: { loaded: number; total: number | undefined }[] = Array.from({ length: count }, () => ({
     loaded: 0,

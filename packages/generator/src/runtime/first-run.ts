@@ -4,17 +4,17 @@ import type { FixedOutput, RunOutputs } from './live-session.js';
 import type { GeneratorModel } from './open-model.js';
 import { ELEMENT_BYTES, readTensors, TENSOR_USAGE } from './tensor-buffers.js';
 
-/** Bytes of a piece of an output in which runs are compared, and how many pieces at most, spread over the output. */
+/** Size of the compared ranges of an output, and their maximum number, spread over the output. */
 const PIECE_BYTES = 65_536;
 const MOST_PIECES = 8;
 
-/** Pieces of what a run wrote. */
+/** Ranges of a run's output. */
 export interface WrittenRun {
   readonly dims: Readonly<Record<string, readonly number[]>>;
   readonly parts: Evidence['parts'];
 }
 
-/** Reads pieces of what a run has written; what lies behind its rows is anybody's. */
+/** Reads ranges of a run's output; data after its rows is undefined. */
 export async function readRun(
   device: GPUDevice,
   { outputs }: GeneratorModel,
@@ -22,12 +22,12 @@ export async function readRun(
 ): Promise<WrittenRun> {
   const parts = outputs.flatMap(({ name: tensor, dtype }) => {
     const bytes = elementsOf(dims[tensor]) * ELEMENT_BYTES[dtype];
-    // More rows than declared are not there, and refused later.
+    // More rows than declared do not exist in the buffer, and are rejected later.
     const size = Math.min(bytes - (bytes % 4), tensors[tensor].size);
     const pieces = Math.min(MOST_PIECES, Math.ceil(size / PIECE_BYTES));
     return Array.from({ length: Math.max(1, pieces) }, (_, i) => {
       const offset = pieces > 1 ? Math.floor(((size - PIECE_BYTES) * i) / (pieces - 1) / 4) * 4 : 0;
-      // A count of 64 bits is compared as two of 32.
+      // A 64-bit count is compared as two 32-bit numbers.
       const compared = dtype === 'int64' ? ('int32' as const) : dtype;
       return { tensor, dtype: compared, offset, size: Math.min(PIECE_BYTES, size), buffer: tensors[tensor] };
     });
@@ -39,12 +39,12 @@ export async function readRun(
   };
 }
 
-/** True if two runs have written the same, as far as they were read. */
+/** Whether two runs have the same output in the ranges that were read. */
 export const isEqual = ({ parts: a }: WrittenRun, { parts: b }: WrittenRun): boolean =>
   a.length === b.length &&
   a.every(({ bytes }, i) => bytes.length === b[i].bytes.length && bytes.every((byte, k) => byte === b[i].bytes[k]));
 
-/** A run, and what it was given, for a comparison elsewhere: inputs that are on the GPU are read. */
+/** A run and its inputs for a comparison in a worker: inputs on the GPU are read back. */
 export async function evidenceOf(device: GPUDevice, inputs: Inputs, { dims, parts }: WrittenRun): Promise<Evidence> {
   const feeds = await Promise.all(
     Object.entries(inputs).map(async ([name, value]) => {
@@ -55,7 +55,7 @@ export async function evidenceOf(device: GPUDevice, inputs: Inputs, { dims, part
   return { feeds: Object.fromEntries(feeds), dims, parts };
 }
 
-/** Numbers of a tensor on the GPU; what is read is whole words. */
+/** Numbers of a tensor on the GPU, read in whole words. */
 export async function numbersOf(device: GPUDevice, input: GpuTensor): Promise<Float32Array | Int32Array | Uint16Array> {
   const { buffer, dtype, dims } = input;
   const length = elementsOf(dims);

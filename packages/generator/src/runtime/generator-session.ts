@@ -15,17 +15,17 @@ import type { Verdict } from '../proof/record.js';
 import { ELEMENT_BYTES } from './tensor-buffers.js';
 import { runFault, startSession } from './start-session.js';
 
-/** Runs that may fail one after the other before a model is given up, or, if it has run before, left alone for a while. */
+/** Consecutive failures after which a model is abandoned or, if it has run before, paused. */
 const MAX_FAILURES = 2;
-/** That while at first, and at most, ms: it doubles. */
+/** Initial and maximum pause, ms; it doubles. */
 const FIRST_REST_MS = 250;
 const LONGEST_REST_MS = 2_000;
-/** Copies of the runtime that other models may break while one run is tried. */
+/** Maximum number of copies of the runtime that other models may break while one run is tried. */
 const MOST_COPIES = 5;
 
 /**
- * A generator on one device: one session of the runtime, however many show it. A run that fails takes the runtime's session with
- * it; the next run starts another.
+ * A generator on one device: one session of the runtime, shared by all its users. A failed run ends the runtime's
+ * session; the next run starts another.
  */
 export class GeneratorSession {
   readonly model: GeneratorModel;
@@ -40,17 +40,18 @@ export class GeneratorSession {
   #failures = 0;
   #lastFailure: unknown;
   #hasRun = false;
-  /** The last failure cost a copy of the runtime. */
+  /** Whether the last failure broke a copy of the runtime. */
   #hasBroken = false;
   #isLost = false;
   #isReleased = false;
-  /** Why the GPU is not used any more. */
+  /** Reason that the GPU is not used any more. */
   #refusal: string | undefined;
   #verdict: Verdict | undefined;
 
   /**
-   * @param onFallback told once if the model has to run on the CPU
-   * @param compare whether what the first run writes on the GPU is compared with what the CPU writes; a function starts the worker for it
+   * @param onFallback Called once if the model has to run on the CPU.
+   * @param compare Whether the output of the first run on the GPU is compared with that on the CPU; a function starts
+   * the worker for it.
    * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
    */
   constructor(
@@ -72,19 +73,19 @@ export class GeneratorSession {
     });
   }
 
-  /** How it runs; undefined until it has. */
+  /** Session kind; undefined before the first run. */
   get kind(): SessionKind | undefined {
     return this.#kind;
   }
 
-  /** What the comparison with the CPU has shown; undefined until it has, which is some seconds after the first run. */
+  /** Result of the comparison with the CPU; undefined until some seconds after the first run. */
   get verdict(): Verdict | undefined {
     return this.#verdict;
   }
 
   /**
    * Values of the inputs for a state of the page, of one instance.
-   * @param given inputs that another model writes; they are left out.
+   * @param given Inputs that another model writes, which are excluded.
    * @throws GaussianSplatError `argument/value`
    */
   bind(state: GeneratorState, given: ReadonlySet<string> = new Set()): Inputs {
@@ -94,7 +95,7 @@ export class GeneratorSession {
   }
 
   /**
-   * Another session of the same model, for runs of exactly this number of instances.
+   * Another session of the same model, for exactly this number of instances.
    * @throws GaussianSplatError `out-of-memory/buffer-limit`, as the constructor.
    */
   forInstances(count: number): GeneratorSession {
@@ -110,23 +111,23 @@ export class GeneratorSession {
   }
 
   /**
-   * Runs the model; the first run also starts the session, and `use` gets its outputs before recording begins. `use` must submit its work before it
-   * returns.
-   * @throws ContractError `contract/run` if the runtime fails; GaussianSplatError `device-lost/unrecoverable` if the device is lost,
-   * `network/*` if the runtime cannot be fetched; what `use` throws.
+   * Runs the model. The first run also starts the session, and `use` is called with its outputs before graph capture
+   * begins. `use` must submit its work before it returns.
+   * @throws ContractError `contract/run` if the runtime fails; GaussianSplatError `device-lost/unrecoverable` if the
+   * device is lost, `network/*` if the runtime cannot be fetched; errors of `use`.
    */
   async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     for (let copies = 1; ; copies++) {
       try {
         return await this.#runOnce(inputs, use);
       } catch (error) {
-        // Another model has broken the copy of the runtime that held this session: it starts again in the next copy.
+        // Another model has broken this session's copy of the runtime: it starts again in the next copy.
         if (!(error instanceof RuntimeGone) || copies === MOST_COPIES) throw error;
       }
     }
   }
 
-  /** True for a model that will not be tried again: one that has never run, or that breaks the runtime whenever it does. */
+  /** Whether the model will not be tried again: it has never run, or it breaks the runtime whenever it does. */
   get hasGivenUp(): boolean {
     return this.#failures >= MAX_FAILURES && (!this.#hasRun || this.#hasBroken);
   }
@@ -135,14 +136,14 @@ export class GeneratorSession {
     this.#weights.runBegins();
     await this.#rest();
     const first = new FirstUse((outputs) => {
-      // A lost device writes nothing, and the runtime does not notice.
+      // A lost device writes nothing, and the runtime does not detect it.
       this.#requireLife();
       use(outputs);
     });
     const starting = (this.#live ??= this.#start(inputs, first.take));
     const live = await this.#started(starting);
     try {
-      // The run that started the session has answered this request.
+      // The run that started the session has already served this request.
       if (first.isTaken) first.requireSuccess();
       else await live.run(inputs, first.use);
       this.#failures = 0;
@@ -154,12 +155,12 @@ export class GeneratorSession {
     }
   }
 
-  /** After runs that have failed. @throws what the last one threw if the model is given up; what {@link #requireLife} throws */
+  /** Pauses after failed runs. @throws the last error if the model is abandoned; errors of {@link #requireLife} */
   async #rest(): Promise<void> {
     this.#requireLife();
     if (this.#failures < MAX_FAILURES) return;
     if (this.hasGivenUp) throw this.#lastFailure;
-    // Values that a model cannot take may be followed by others that it can; starting again takes time.
+    // Invalid values may be followed by valid ones, but restarting takes time.
     const ms = Math.min(LONGEST_REST_MS, FIRST_REST_MS * 2 ** (this.#failures - MAX_FAILURES));
     await new Promise((resolve) => setTimeout(resolve, ms));
     this.#requireLife();
@@ -181,7 +182,7 @@ export class GeneratorSession {
     }
   }
 
-  /** Lets go of the runtime's session. */
+  /** Releases the runtime's session. */
   async release(): Promise<void> {
     this.#isReleased = true;
     this.#weights.runBegins();
@@ -189,7 +190,7 @@ export class GeneratorSession {
     await this.#releaseLive();
   }
 
-  /** Lets go of the runtime's session and its weights; a later run starts another. */
+  /** Releases the runtime's session and its weights; a later run starts another. */
   async #releaseLive(): Promise<void> {
     const live = this.#live;
     this.#live = undefined;
@@ -221,7 +222,7 @@ export class GeneratorSession {
     return session;
   }
 
-  /** Once what the GPU writes turns out to be wrong, the model runs on the CPU: the next run starts there. */
+  /** If the GPU output is wrong, the model runs on the CPU from the next run on. */
   async #prove(evidence: Evidence): Promise<void> {
     const startWorker = typeof this.#compare === 'function' ? this.#compare : undefined;
     const verdict = await prove(this.model, this.device, evidence, this.#end.signal, startWorker);
@@ -259,7 +260,7 @@ export class GeneratorSession {
   }
 }
 
-/** Takes the outputs of the run that starts a session. What it throws must not count as a fault of that run. */
+/** Consumes the outputs of the run that starts a session. Its errors must not count as faults of that run. */
 class FirstUse {
   readonly use: (outputs: RunOutputs) => void;
   #taken: { readonly error?: unknown } | undefined;
@@ -281,7 +282,7 @@ class FirstUse {
     }
   };
 
-  /** @throws what `use` threw */
+  /** @throws errors of `use` */
   requireSuccess(): void {
     if (this.#taken && 'error' in this.#taken) throw this.#taken.error;
   }

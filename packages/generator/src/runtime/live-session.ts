@@ -16,31 +16,31 @@ import { numbersOf } from './first-run.js';
 import { SessionBuffers } from './session-buffers.js';
 import { bufferBytes } from './tensor-buffers.js';
 
-/** How a session runs: recorded GPU commands, GPU commands made anew, or the CPU. */
+/** Kind of a session: captured GPU commands, GPU commands encoded for each run, or the CPU. */
 export type SessionKind = 'captured' | 'webgpu' | 'wasm';
 
-/** What one run wrote: storage buffers by the names of the outputs, valid until the next run. */
+/** Output of one run: storage buffers by the names of the outputs, valid until the next run. */
 export interface RunOutputs {
   readonly tensors: Readonly<Record<string, GPUBuffer>>;
   /** Shapes of this run, by the same names. */
   readonly dims: Readonly<Record<string, readonly number[]>>;
-  /** Rows of Gaussians that this run wrote, of one instance; 1 for an image. */
+  /** Rows of Gaussians of one instance in this run; 1 for an image. */
   readonly rows: number;
 }
 
-/** An output that is the same in every run: it is there, and not asked for. */
+/** An output that is the same in every run: it is kept, and not requested again. */
 export interface FixedOutput {
   readonly buffer: GPUBuffer;
   readonly dims: readonly number[];
 }
 
-/** By the names of outputs. */
+/** Fixed outputs by name. */
 export type FixedOutputs = Record<string, FixedOutput>;
 
-/** What the runtime would log comes with its errors, too. */
+/** Log messages of the runtime are part of its errors, too. */
 const QUIET = { logSeverityLevel: 4 } as const;
 
-/** A session of ONNX Runtime with its inputs and outputs on the GPU. After a run that failed it must not be used again. */
+/** A session of ONNX Runtime with its inputs and outputs on the GPU. After a failed run it must not be used again. */
 export class LiveSession {
   readonly kind: SessionKind;
   readonly #runtime: Runtime;
@@ -54,7 +54,7 @@ export class LiveSession {
   readonly #feeds: Record<string, Tensor> = {};
   #hasFailed = false;
   #isReleased = false;
-  /** What a captured session writes to. */
+  /** Output buffers of a captured session. */
   #written: readonly GPUBuffer[] = [];
 
   private constructor(
@@ -71,15 +71,15 @@ export class LiveSession {
     this.#device = device;
     this.#outputs = outputs;
     this.#instances = instances ?? 1;
-    // A run that is asked for nothing would compute nothing.
+    // A run without requested outputs would compute nothing.
     this.#fixed = outputs.every(({ name }) => name in fixed) ? {} : fixed;
     this.#names = outputs.map(({ name }) => name).filter((name) => !(name in this.#fixed));
     this.#buffers = new SessionBuffers(device);
   }
 
   /**
-   * @param fixed outputs that are never asked for; of a session that is made with them they are, and destroyed by it
-   * @throws whatever the runtime says.
+   * @param fixed Outputs that are never requested; a session that is created with them owns and destroys them.
+   * @throws errors of the runtime.
    */
   static async create(
     kind: SessionKind,
@@ -98,7 +98,7 @@ export class LiveSession {
       preferredOutputLocation: 'gpu-buffer',
       enableGraphCapture: kind === 'captured',
     };
-    // On the CPU, and where the runtime's fusions are known to compute something else, the graph runs as it is written.
+    // On the CPU, and if the runtime's fusions are known to be wrong, the graph runs without fusions.
     const isFused = kind !== 'wasm' && misfusedProducts(model.header).length === 0;
     const session = await runtime.exclusive(() =>
       runtime.ort.InferenceSession.create(model.bytes, {
@@ -110,20 +110,21 @@ export class LiveSession {
     return new LiveSession(kind, runtime, session, device, model, fixed);
   }
 
-  /** True after a run that failed. */
+  /** Whether a run has failed. */
   get hasFailed(): boolean {
     return this.#hasFailed;
   }
 
-  /** True if the copy of the runtime that it is in cannot be used any more. */
+  /** Whether its copy of the runtime is unusable. */
   get hasBrokenRuntime(): boolean {
     return this.#runtime.isBroken;
   }
 
   /**
-   * Runs the model, and hands what it wrote to `use`, which must submit all its work before it returns. Nothing else of the runtime
-   * runs in between.
-   * @throws what the runtime says, and then {@link hasFailed}; RuntimeGone if it never began, since the runtime or the session is gone; or what `use` throws.
+   * Runs the model, and calls `use` with its output, which must submit all its work before it returns. No other call of
+   * the runtime runs in between.
+   * @throws errors of the runtime, with {@link hasFailed} set; RuntimeGone if it never started, because the runtime or
+   * the session is gone; or errors of `use`.
    */
   async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     try {
@@ -137,13 +138,13 @@ export class LiveSession {
     }
   }
 
-  /** Lets go of everything. Never rejects: a session that has failed may not even be able to leave. */
+  /** Releases everything. Never rejects: even releasing a failed session may fail. */
   async release(): Promise<void> {
     if (this.#isReleased) return;
     this.#isReleased = true;
     await this.#runtime.exclusive(() => this.#session.release()).catch(() => undefined);
     this.#buffers.destroy();
-    // The runtime leaves alone what a captured session has written to all the time.
+    // The runtime does not free the output buffers of a captured session.
     for (const buffer of this.#written) buffer.destroy();
     for (const { buffer } of Object.values(this.#fixed)) buffer.destroy();
   }
@@ -157,7 +158,7 @@ export class LiveSession {
       );
       use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(dims, this.#outputs, this.#instances) });
     } finally {
-      // Recycled for what is submitted later; a captured session writes the same buffers for ever.
+      // Freed for later submissions; a captured session keeps its buffers.
       if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
     }
   }
@@ -172,7 +173,10 @@ export class LiveSession {
     }
   }
 
-  /** Inputs live in buffers of ours: the runtime would make new ones for every run, and recorded commands read what they have read first. */
+  /**
+   * Inputs are kept in our own buffers: the runtime would create new ones for every run, and captured commands always
+   * read the same ones.
+   */
   async #feed(name: string, input: InputValue): Promise<void> {
     const isRead = this.kind === 'wasm' || input.dtype === 'int64';
     if (isRead) {
@@ -186,7 +190,7 @@ export class LiveSession {
     else this.#device.queue.writeBuffer(buffer, 0, input.data as Float32Array<ArrayBuffer>);
   }
 
-  /** The buffer of an input, and the runtime's word for it. */
+  /** The buffer of an input, and its tensor of the runtime. */
   #tensorOn(name: string, { dtype, dims }: InputValue): GPUBuffer {
     const buffer = this.#buffers.of(`input.${name}`, bufferBytes(dtype, elementsOf(dims)));
     const feed = this.#feeds[name] as Tensor | undefined;
@@ -212,16 +216,16 @@ export class LiveSession {
     return tensors;
   }
 
-  /** Outputs of the CPU; empty ones are there, too, wherever the model ran. */
+  /** Outputs on the CPU; empty ones are on the CPU for any kind of session. */
   #upload({ name, most }: ModelOutput, { type, data, size }: Tensor): GPUBuffer {
     const buffer = this.#buffers.of(`output.${name}`, bufferBytes(type, most ?? size));
-    // More than the contract allows is refused by whoever takes it.
+    // The consumer rejects more than the contract allows.
     if (size > 0 && size <= (most ?? size)) this.#buffers.write(buffer, data as Float32Array<ArrayBuffer>);
     return buffer;
   }
 }
 
-/** A run of several instances has a size that the file leaves open, and recorded commands need fixed ones. */
+/** The axis of instances is symbolic in the file, but graph capture needs fixed sizes. */
 function fixedDimensions({ contract, instances }: GeneratorModel): Record<string, number> | undefined {
   return instances === undefined ? undefined : { [contract.instances!.axis]: instances };
 }

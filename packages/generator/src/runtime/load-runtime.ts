@@ -2,27 +2,28 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchBytes } from './fetch-bytes.js';
 import { noteRuntimeBytes, WASM_BYTES, wasmBuild } from './runtime-progress.js';
 
-// Who shows no generator need not have onnxruntime-web, nor its types: then this is any.
+// Pages without generators need neither onnxruntime-web nor its types: then this is any.
 // eslint-disable-next-line @typescript-eslint/ban-ts-comment
 /** @ts-ignore */
 // eslint-disable-next-line @typescript-eslint/consistent-type-imports
 export type Ort = typeof import('onnxruntime-web/webgpu');
 
-/** Longest that one call of the runtime may take, ms. */
+/** Time limit of one call of the runtime, ms. */
 let callLimit = 120_000;
 
 /**
- * How long one call of the runtime may take, milliseconds; default 120,000. What has not ended by then is given up, and with it that copy of the
- * runtime: the next call loads another. A model on the CPU holds the page's thread and cannot be given up.
+ * Sets the time limit of one call of the runtime, in milliseconds; default 120,000. A call that exceeds it is
+ * abandoned, together with that copy of the runtime: the next call loads another. A model on the CPU blocks the main
+ * thread and cannot be abandoned.
  */
 export function setRunLimit(milliseconds: number): void {
   callLimit = milliseconds;
 }
 
-/** What WebAssembly says when the module's memory can no longer be trusted. */
+/** Messages of WebAssembly after which the module's memory is invalid. */
 const FATAL = /\bAborted\(|unreachable|out of bounds|table index/;
 
-/** A call that never began, since an earlier one has broken this copy of the runtime: another copy would do it. */
+/** A call that never started because an earlier one has broken this copy of the runtime: another copy could run it. */
 export class RuntimeGone extends Error {}
 
 export interface RuntimeSource {
@@ -32,12 +33,12 @@ export interface RuntimeSource {
 }
 
 /**
- * One loaded copy of ONNX Runtime. Its calls must never overlap: two runs at a time never settle, two creations refuse each other
- * for good. So there is one queue for everything.
+ * One loaded copy of ONNX Runtime. Its calls must never overlap: two concurrent runs never settle, two concurrent
+ * creations block each other permanently. So there is one queue for all calls.
  */
 export class Runtime {
   readonly ort: Ort;
-  /** Where it came from, for another copy in a worker. */
+  /** Source files, for another copy in a worker. */
   readonly source: RuntimeSource;
   #tail: Promise<unknown> = Promise.resolve();
   #breakage: unknown;
@@ -47,14 +48,14 @@ export class Runtime {
     this.source = source;
   }
 
-  /** True once this copy cannot be used any more; {@link loadRuntime} then loads another. */
+  /** Whether this copy is unusable; {@link loadRuntime} then loads another. */
   get isBroken(): boolean {
     return this.#breakage !== undefined;
   }
 
   /**
-   * Runs a task when all earlier ones have ended, however they ended.
-   * @throws RuntimeGone if one of them has broken this copy; what the task throws.
+   * Runs a task after all earlier ones have ended, even by failures.
+   * @throws RuntimeGone if one of them has broken this copy; errors of the task.
    */
   exclusive<T>(task: () => Promise<T>): Promise<T> {
     const result = this.#tail.then(() => this.#guard(task));
@@ -85,9 +86,10 @@ let loading: Promise<Runtime> | undefined;
 let copies = 0;
 
 /**
- * Where four files of onnxruntime-web 1.30.0 are: `ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs`, `ort-wasm-simd-threaded.jspi.wasm` and
- * `ort-wasm-simd-threaded.asyncify.wasm`. Default: the folder `onnxruntime/` beside this module, where the CDN build has them.
- * @param folder absolute, or relative to the page.
+ * Sets the location of four files of onnxruntime-web 1.30.0: `ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs`,
+ * `ort-wasm-simd-threaded.jspi.wasm` and `ort-wasm-simd-threaded.asyncify.wasm`. Default: the folder `onnxruntime/`
+ * beside this module, as in the CDN build.
+ * @param folder Absolute, or relative to the page.
  */
 export function setRuntimeLocation(folder: string | URL): void {
   const url = new URL(folder, globalThis.location?.href);
@@ -96,13 +98,13 @@ export function setRuntimeLocation(folder: string | URL): void {
   location = url.href;
 }
 
-/** True once a byte of the runtime has been asked for. */
+/** Whether the runtime has been requested. */
 export const isRuntimeRequested = (): boolean => loading !== undefined;
 
 /**
- * The page's copy of ONNX Runtime: fetched when first asked for; the build for browsers that can suspend WebAssembly where they can
- * (JSPI), else the larger one for all others. Both hold kernels for WebGPU and for the CPU.
- * @throws GaussianSplatError `network/*` if a file of it cannot be had; asked again, it is fetched again.
+ * Returns the page's copy of ONNX Runtime, fetched at the first call: the build with JSPI if the browser supports it,
+ * else the larger one. Both have kernels for WebGPU and for the CPU.
+ * @throws GaussianSplatError `network/*` if a file is unavailable; another call fetches it again.
  */
 export async function loadRuntime(): Promise<Runtime> {
   const current = (loading ??= load());
@@ -128,7 +130,7 @@ async function load(): Promise<Runtime> {
     },
   );
   noteRuntimeBytes(null);
-  // What it has to say comes with its errors, which are passed on.
+  // Log messages are part of the errors, which are passed on.
   ort.env.logLevel = 'fatal';
   ort.env.wasm.numThreads = 1;
   ort.env.wasm.wasmBinary = wasmBinary.buffer;
@@ -136,8 +138,10 @@ async function load(): Promise<Runtime> {
 }
 
 /**
- * The folder `onnxruntime/` beside a module. Not by `new URL(…, import.meta.url)`, which bundlers take for a file that they are to copy.
- * @throws GaussianSplatError `network/unreachable` where the address says nothing: bundlers leave none, or that of a file on the disk they ran on.
+ * Returns the folder `onnxruntime/` beside a module. `new URL(…, import.meta.url)` is avoided, because bundlers would
+ * treat it as a file to copy.
+ * @throws GaussianSplatError `network/unreachable` if the module address is unusable: bundlers remove it, or leave that
+ * of a file on the build machine.
  */
 export function folderBeside(module: string | undefined): string {
   const isHidden = !module || (module.startsWith('file:') && globalThis.location?.protocol.startsWith('http'));
@@ -157,10 +161,10 @@ const REMEDY =
   `put these files of node_modules/onnxruntime-web/dist there (npm install onnxruntime-web@1.30.0): ${FILES}; ` +
   'or name their folder with GaussianSplatElement.runtimeLocation (without the element: setRuntimeLocation)';
 
-/** How long a script may take, ms: nobody sees how much of a module has arrived. */
+/** Time limit of loading a script, ms, because its progress is not observable. */
 const SCRIPT_LIMIT_MS = 120_000;
 
-/** A module is evaluated once for each address: another copy needs another address. */
+/** A module is evaluated once for each address, so another copy needs another address. */
 async function importScript(script: string): Promise<Ort> {
   const address = copies++ === 0 ? script : `${script}?copy=${copies}`;
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -173,7 +177,7 @@ async function importScript(script: string): Promise<Ort> {
     throw new GaussianSplatError('network/unreachable', {
       where: script.slice(0, 200),
       expected: 'the script of onnxruntime-web 1.30.0',
-      // The same whichever copy it was: what is told twice is told once.
+      // The same message for every copy, so that it is reported only once.
       found: ((cause as Error)?.message ?? 'nothing').replace(address, script),
       remedy: REMEDY,
       cause,
@@ -183,7 +187,7 @@ async function importScript(script: string): Promise<Ort> {
   }
 }
 
-/** Fetched by us: a copy of the runtime that did not find its WebAssembly never works again. */
+/** Fetched here, because a copy of the runtime that did not find its WebAssembly never works again. */
 async function fetchWasm(folder: string, build: keyof typeof WASM_BYTES): Promise<Uint8Array<ArrayBuffer>> {
   const expected = WASM_BYTES[build];
   const url = `${folder}ort-wasm-simd-threaded.${build}.wasm`;

@@ -2,18 +2,18 @@ import type { Contract, GaussianLayout } from '@gaussian-splat/core/contract';
 import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { elementsOf } from '../input-value.js';
 
-/** An output that is asked for. */
+/** A requested output. */
 export interface ModelOutput {
   readonly name: string;
   readonly kind: 'gaussians' | 'count' | 'image' | 'state';
   readonly dtype: 'float32' | 'float16' | 'int32' | 'int64';
-  /** Elements of a row of Gaussians. */
+  /** Elements in each row of Gaussians. */
   readonly rowElements?: number;
-  /** Elements that a run writes at most; undefined for a picture whose size only the run tells. */
+  /** Maximum number of elements in a run; undefined for an image whose size only a run determines. */
   readonly most: number | undefined;
 }
 
-/** The outputs that a contract names. @param layout of the Gaussians, if the model writes any */
+/** The outputs that a contract names. @param layout Of the Gaussians, if the model writes any. */
 export function modelOutputs(
   header: OnnxHeader,
   contract: Contract,

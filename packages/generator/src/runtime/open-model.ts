@@ -16,18 +16,21 @@ import { openHeader, type ModelPlace, type OnnxHeader, type OpenedModel } from '
 import { fetchBytes, sumProgress, type FetchOptions, type ProgressListener } from './fetch-bytes.js';
 import { modelOutputs, type ModelOutput } from './model-outputs.js';
 
-/** Where a generator is. */
+/** Location of a generator. */
 export interface ModelSource {
   /** Address of the ONNX file, absolute or relative to the page. */
   readonly url: string;
-  /** The contract, as JSON text or as the object; default: what the model itself carries, else a file beside it. */
+  /** The contract, as JSON text or as the object; default: that in the model's metadata, else a sidecar file. */
   readonly contract?: unknown;
   readonly credentials?: 'omit' | 'same-origin' | 'include';
-  /** Reads the header elsewhere than on the caller's thread. It may take the bytes that it gets, and gives them back as `whole`. Default: core's `openHeader`. */
+  /**
+   * Reads the header on another thread. It may transfer the bytes, and returns them as `whole`. Default: core's
+   * `openHeader`.
+   */
   readonly openHeader?: ((place: ModelPlace, signal?: AbortSignal) => Promise<OpenedModel>) | undefined;
 }
 
-/** A model that keeps its contract, with all of its bytes, and without any runtime. */
+/** A validated model with all of its bytes, but without any runtime. */
 export interface GeneratorModel {
   readonly url: string;
   readonly header: OnnxHeader;
@@ -36,19 +39,19 @@ export interface GeneratorModel {
   readonly layout: GaussianLayout | undefined;
   /** All outputs that the contract names, each once. */
   readonly outputs: readonly ModelOutput[];
-  /** How many instances a run computes; undefined where the model has no axis for them, or it is still a symbol. */
+  /** Number of instances in a run; undefined if the model has no axis for them, or it is still symbolic. */
   readonly instances?: number;
-  /** What was inferred for want of a contract, for a warning; sentences without a full stop. */
+  /** Inferences for a missing contract, for a warning; sentences without a full stop. */
   readonly notes: readonly string[];
   readonly bytes: Uint8Array;
-  /** Files beside the model, by the locations that the model writes. */
+  /** External files, by the locations in the model. */
   readonly externalData: readonly { readonly path: string; readonly data: Uint8Array }[];
 }
 
 /**
- * Fetches a model and holds it against its contract: first the header, and the weights only of a file that is in order.
- * @throws ContractError with every fault; GaussianSplatError `decode/*` for a file that is no ONNX model, `network/*`; the reason of
- * the signal.
+ * Fetches a model and checks it against its contract: first the header, and the weights only if that is valid.
+ * @throws ContractError with every fault; GaussianSplatError `decode/*` for a file that is not an ONNX model,
+ * `network/*`; the reason of the signal.
  */
 export async function openModel(
   source: ModelSource,
@@ -56,7 +59,7 @@ export async function openModel(
 ): Promise<GeneratorModel> {
   const { credentials = 'same-origin', openHeader: open = openHeader } = source;
   const request = { credentials, signal: options.signal };
-  // A worker's own address is not the page's.
+  // A worker's own address differs from the page's.
   const base = globalThis.location?.href;
   const address = URL.canParse(source.url, base) ? new URL(source.url, base).href : source.url;
   const { header, size, whole } = await open({ url: address, credentials }, options.signal);
@@ -66,14 +69,14 @@ export async function openModel(
   const layout = gaussianLayout(header, contract);
   const { externalFiles } = header;
   const reports = sumProgress(externalFiles.length + 1, options.onProgress ?? (() => undefined));
-  // What is known beforehand: the sum of all has a length before the first of them has come.
+  // Known lengths are reported at the start, so that the sum has a total before the first bytes arrive.
   externalFiles.forEach(({ byteLength }, i) => reports[i](0, byteLength));
   reports[externalFiles.length](0, size);
   const externalData = await fetchExternal(source, header, contract, request, reports);
   const onProgress = reports[externalFiles.length];
   if (whole) onProgress(whole.length, whole.length);
   const fetched = whole ?? (await fetchBytes(source.url, { ...request, onProgress, expected: size }));
-  // What was fetched piece by piece may have been replaced since.
+  // A file that was fetched in ranges may have been replaced meanwhile.
   const bytes = whole ?? (await open({ bytes: fetched, name: header.name }, options.signal)).whole ?? fetched;
   return {
     url: source.url,
@@ -87,7 +90,7 @@ export async function openModel(
   };
 }
 
-/** A contract has some kilobytes, a rest pose among them. */
+/** Maximum size of a contract, which has some kilobytes including a rest pose. */
 const MOST_CONTRACT_BYTES = 1 << 20;
 
 const longContract = (where: string, found: number): GaussianSplatError =>
@@ -106,14 +109,14 @@ async function contractOf(source: ModelSource, header: OnnxHeader, request: Fetc
   const bytes = await fetchBytes(sidecarName(source.url), { ...request, mayBeMissing: true });
   if (bytes && bytes.length > MOST_CONTRACT_BYTES) throw longContract(source.url, bytes.length);
   const text = bytes && new TextDecoder().decode(bytes);
-  // Servers of single-page applications answer with their page where there is no file.
+  // Servers of single-page applications respond with their page for missing files.
   const sidecar = text === undefined || /^\s*</.test(text) ? undefined : text;
   return resolveContract({ header, sidecar });
 }
 
-/** Files of weights that a model may have: exporters write one, or one for each large tensor where they are told so. */
+/** Maximum number of weight files: exporters write one, or one for each large tensor on request. */
 const MOST_FILES = 256;
-/** And how many of them are fetched at a time: other requests of the page have their turn. */
+/** Maximum number of concurrent downloads, so that other requests of the page can proceed. */
 const FILES_AT_ONCE = 4;
 
 function tooManyFiles({ name, externalFiles }: OnnxHeader): GaussianSplatError {

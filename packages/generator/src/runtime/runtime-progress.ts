@@ -1,19 +1,19 @@
 import type { ProgressListener } from './fetch-bytes.js';
 
 /**
- * Bytes of the runtime's WebAssembly, onnxruntime-web 1.30.0: known before it is asked for, and also where a server that compresses does not tell
- * the length. Its script, under 1 % of that, is not counted.
+ * Bytes of the runtime's WebAssembly, onnxruntime-web 1.30.0: known before the request, and even if a server with
+ * compression does not declare the length. Its script, under 1 % of that, is not counted.
  */
 export const WASM_BYTES = { jspi: 16_758_545, asyncify: 26_781_914 } as const;
 
-/** The build for browsers that can suspend WebAssembly (JSPI), or the larger one for all others. */
+/** The build with JSPI, or the larger one for all other browsers. */
 export const wasmBuild = (): keyof typeof WASM_BYTES => ('Suspending' in WebAssembly ? 'jspi' : 'asyncify');
 
 const listeners = new Set<ProgressListener>();
-/** Undefined before the runtime is asked for, null once all of it is there. */
+/** Undefined before the request, null once the runtime is loaded. */
 let state: readonly [loaded: number, total: number] | null | undefined;
 
-/** The runtime's bytes so far. @param progress null for the end of it, undefined if it could not be had */
+/** Reports the received bytes of the runtime. @param progress null at the end, undefined after a failure. */
 export function noteRuntimeBytes(progress: typeof state): void {
   state = progress;
   for (const listener of listeners) tell(listener);
@@ -21,8 +21,9 @@ export function noteRuntimeBytes(progress: typeof state): void {
 }
 
 /**
- * Tells how much of the runtime has arrived, now and whenever more has. A runtime that is there already counts as no bytes: nobody waits for them.
- * @returns ends it.
+ * Reports the progress of the runtime, now and whenever more bytes arrive. A loaded runtime counts as no bytes, because
+ * no one waits for them.
+ * @returns A function that unsubscribes.
  */
 export function watchRuntimeBytes(listener: ProgressListener): () => void {
   if (state === null) {

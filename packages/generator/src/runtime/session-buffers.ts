@@ -1,6 +1,6 @@
 import { TENSOR_USAGE } from './tensor-buffers.js';
 
-/** GPU buffers of one session, by name; they grow where a picture or a number of rows does. */
+/** GPU buffers of one session, by name; they grow with images or numbers of rows. */
 export class SessionBuffers {
   readonly #device: GPUDevice;
   readonly #buffers = new Map<string, GPUBuffer>();
@@ -9,11 +9,11 @@ export class SessionBuffers {
     this.#device = device;
   }
 
-  /** The buffer of a name, of `size` bytes or more. */
+  /** Returns the buffer of a name, with at least `size` bytes. */
   of(name: string, size: number): GPUBuffer {
     const found = this.#buffers.get(name);
     if (found !== undefined && found.size >= size) return found;
-    // What was submitted with the old one still runs to its end.
+    // Commands that were submitted with the old buffer still complete.
     found?.destroy();
     const buffer = this.#device.createBuffer({ label: `gs.generator.${name}`, size, usage: TENSOR_USAGE });
     this.#buffers.set(name, buffer);
@@ -27,7 +27,7 @@ export class SessionBuffers {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** GPU buffers are written in whole words; an odd number of float16 is not. */
+  /** GPU buffers are written in whole words, but an odd number of float16 is not a multiple of one. */
   write(buffer: GPUBuffer, { buffer: memory, byteOffset, byteLength }: ArrayBufferView<ArrayBuffer>): void {
     const whole = byteLength - (byteLength % 4);
     this.#device.queue.writeBuffer(buffer, 0, memory, byteOffset, whole);

@@ -3,10 +3,10 @@ import { GeneratorSession } from './generator-session.js';
 import type { FetchOptions } from './fetch-bytes.js';
 import { openModel, type ModelSource } from './open-model.js';
 
-/** A share in a session. */
+/** A reference to a shared session. */
 export interface SessionLease {
   readonly session: GeneratorSession;
-  /** Gives the share back; the last one releases the session. Further calls do nothing. */
+  /** Releases the reference; the last one releases the session. Further calls have no effect. */
   release(): void;
 }
 
@@ -14,7 +14,7 @@ interface Entry {
   users: number;
   readonly abort: AbortController;
   readonly session: Promise<GeneratorSession>;
-  /** Whether it is of no use to anybody any more. */
+  /** Whether it is unusable for all users. */
   readonly hasGivenUp: () => boolean;
   readonly fallbackListeners: Set<(reason: string) => void>;
   fallback: string | undefined;
@@ -23,18 +23,18 @@ interface Entry {
 const devices = new WeakMap<GPUDevice, Map<string, Entry>>();
 
 export interface AcquireOptions extends Pick<FetchOptions, 'signal' | 'onProgress'> {
-  /** The model runs on the CPU, because of the reason given. */
+  /** Called with the reason when the model runs on the CPU. */
   readonly onFallback?: (reason: string) => void;
   /**
-   * Whether what the first run writes on the GPU is compared with what the CPU writes: in a worker, when the page is idle, once for each model and
-   * adapter. Where they differ the model runs on the CPU from then on. Default true; of those who share a model the first one's word counts. A
-   * function starts the worker: see {@link StartWorker}.
+   * Whether the output of the first run on the GPU is compared with that on the CPU: in a worker, when the page is
+   * idle, once for each model and adapter. If they differ the model runs on the CPU from then on. Default true; of
+   * several users of a model the first one's value applies. A function starts the worker: see {@link StartWorker}.
    */
   readonly compare?: boolean | StartWorker;
 }
 
 /**
- * The session of a generator on a device, shared by all who ask for the same address and contract.
+ * Returns the session of a generator on a device, shared by all users with the same address and contract.
  * @throws as `openModel` does.
  */
 export async function acquireSession(
@@ -47,7 +47,7 @@ export async function acquireSession(
   devices.set(device, entries);
   const key = keyOf(source);
   let entry = entries.get(key);
-  // Whoever asks anew may find another file at the address.
+  // A new request may find another file at the address.
   if (entry === undefined || entry.hasGivenUp()) entries.set(key, (entry = open(source, device, options)));
   const shared = entry;
   const { onFallback = () => undefined } = options;
@@ -68,7 +68,7 @@ export async function acquireSession(
     const session = await unlessAborted(shared.session, options.signal);
     return { session, release };
   } catch (error) {
-    // Whoever asks next tries again.
+    // The next request tries again.
     if (!options.signal?.aborted && entries.get(key) === shared) entries.delete(key);
     release();
     throw error;

@@ -14,34 +14,35 @@ export interface StartOptions {
   readonly device: GPUDevice;
   /** Inputs of the warm-up. */
   readonly inputs: Inputs;
-  /** Throws once nobody wants the session any more, or the device is lost: then there is nothing left to try. */
+  /** Throws once the session is not needed any more, or the device is lost: then further attempts are pointless. */
   readonly requireLife: () => void;
-  /** The model has broken a copy of the runtime. */
+  /** Called when the model has broken a copy of the runtime. */
   readonly onBreakage: () => void;
-  /** The model runs, but on the CPU; the reason is for people. */
+  /** Called when the model runs on the CPU, with the reason for display. */
   readonly onFallback: (reason: string) => void;
-  /** Why the GPU is not to be tried; undefined where it is. */
+  /** Reason that the GPU must not be tried; undefined to try it. */
   readonly refusal?: string;
-  /** Whether what the first run wrote on the GPU is to be kept for a comparison. */
+  /** Whether to keep the output of the first run on the GPU for a comparison. */
   readonly keepsEvidence?: boolean;
   /**
-   * Takes the outputs of the first run: they answer the request that starts the session, before any run that serves the recording. It must submit its work
-   * before it returns, and must not throw. It is called again only if a later start replaces the first one.
+   * Called with the outputs of the first run: they serve the request that starts the session, before any run for graph
+   * capture. It must submit its work before it returns, and must not throw. It is called again only if a later start
+   * replaces the first one.
    */
   readonly onFirstRun?: (outputs: RunOutputs) => void;
 }
 
-/** A session that has run, and what its first run on the GPU wrote, if that is to be compared. */
+/** A session that has run, and the output of its first run on the GPU, if that is to be compared. */
 export interface StartedSession {
   readonly session: LiveSession;
   readonly evidence?: Evidence;
 }
 
 /**
- * A session that has run, so that everything is compiled: with its GPU commands recorded where model and runtime allow, else with
- * commands made for every run, else on the CPU.
- * @throws ContractError `contract/run` if the model runs nowhere; GaussianSplatError `network/*` if the runtime cannot be had; RuntimeGone if
- * another model has broken the runtime meanwhile; what `requireLife` throws.
+ * Starts a session and runs it once, so that everything is compiled: with graph capture if model and runtime allow it,
+ * else with commands encoded for every run, else on the CPU.
+ * @throws ContractError `contract/run` if the model does not run; GaussianSplatError `network/*` if the runtime is
+ * unavailable; RuntimeGone if another model has broken the runtime meanwhile; errors of `requireLife`.
  */
 export async function startSession(options: StartOptions): Promise<StartedSession> {
   const { model, device, onFallback, refusal } = options;
@@ -58,7 +59,7 @@ export async function startSession(options: StartOptions): Promise<StartedSessio
   }
   const reason = refusals.join('; ');
   const started = await start('wasm', options, refusals, (outputs) => {
-    // Who listens asks anew for what the GPU may have written wrongly: this run answers that.
+    // Listeners request results again that the GPU may have computed wrongly: this run serves that request.
     onFallback(reason);
     options.onFirstRun?.(outputs);
   });
@@ -67,13 +68,14 @@ export async function startSession(options: StartOptions): Promise<StartedSessio
 }
 
 /**
- * Recorded commands must write what commands made anew write, for other inputs than those that they were recorded with, too. Only
- * kernels are recorded: a result in another shape is copied in the first run and then no more. Outputs that are constants are not asked for
- * again: what the first run wrote of them stays.
+ * Captured commands must write the same results as encoded ones, also for other inputs than those of the capture. Only
+ * kernels are captured: a reshaped result is copied in the first run and then never again. Outputs that are constants
+ * are kept from the first run.
  */
 async function startOnGpu(options: StartOptions, refusals: string[]): Promise<StartedSession | undefined> {
   const { model, device, keepsEvidence } = options;
-  // The proof of a recording takes four runs, which a model that runs for each choice of a person does not earn back.
+  // Verifying a capture takes four runs, which do not pay off for a model that runs only when a visitor selects another
+  // input.
   const isRecordable = canBeRecorded(model) && cadenceOf(model) === 'continuous';
   const constants = isRecordable ? constantOutputs(model.header) : new Set<string>();
   const fixed: FixedOutputs = {};
@@ -95,7 +97,7 @@ async function startOnGpu(options: StartOptions, refusals: string[]): Promise<St
   return session && { session, evidence };
 }
 
-/** @param changed the same with other inputs */
+/** @param changed The same with other inputs. */
 async function startRecorded(
   options: StartOptions,
   plain: Started,
@@ -108,7 +110,7 @@ async function startRecorded(
     await plain.session.release();
     return (await start('webgpu', options, refusals))?.session;
   }
-  // One at a time: both would hold the weights.
+  // One after the other, because both hold the weights.
   await plain.session.release();
   const recorded = await start('captured', options, [], undefined, fixed);
   if (recorded && isEqual(recorded.written, plain.written)) {
@@ -119,7 +121,7 @@ async function startRecorded(
   return (await start('webgpu', options, refusals))?.session;
 }
 
-/** A fault of the runtime, in our words. */
+/** Describes a fault of the runtime. */
 export function runFault({ header }: GeneratorModel, found: string): ContractFault {
   return {
     code: 'contract/run',
@@ -140,7 +142,7 @@ function isHalfWithoutFeature({ header, outputs }: GeneratorModel, device: GPUDe
   return isHalf && !device.features.has('shader-f16');
 }
 
-/** Commands can be recorded only for fixed shapes and with all inputs on the GPU, where there are no 64-bit integers. */
+/** Graph capture requires fixed shapes and all inputs on the GPU, which has no 64-bit integers. */
 function canBeRecorded({ header }: GeneratorModel): boolean {
   const isFixed = [...header.inputs, ...header.outputs].every(({ dims }) =>
     dims?.every((dim) => typeof dim === 'number'),
@@ -148,14 +150,17 @@ function canBeRecorded({ header }: GeneratorModel): boolean {
   return isFixed && header.inputs.every(({ dtype }) => dtype !== 'int64');
 }
 
-/** What {@link otherInputs} gives. */
+/** Result of {@link otherInputs}. */
 interface OtherInputs {
   readonly inputs: Inputs;
-  /** To be destroyed once nothing runs with them any more. */
+  /** To be destroyed once no run uses them any more. */
   readonly buffers: readonly GPUBuffer[];
 }
 
-/** Inputs that are not those given, pictures and Gaussians on the GPU included. Whether a model likes them does not matter: two runs are compared. */
+/**
+ * Inputs that differ from the given ones, including images and Gaussians on the GPU. They need not be meaningful to the
+ * model, because two runs are compared.
+ */
 function otherInputs({ device, inputs }: StartOptions): OtherInputs {
   const buffers: GPUBuffer[] = [];
   const changed = Object.entries(inputs).map(([name, value]): [string, InputValue] => {
@@ -165,7 +170,7 @@ function otherInputs({ device, inputs }: StartOptions): OtherInputs {
       return [name, { ...value, buffer }];
     }
     if (value.dtype === 'float32') return [name, { ...value, data: numbers(value.data).map((x) => 0.75 * x + 0.125) }];
-    // Indices: of all others these are most likely to be within what they point into.
+    // 0 and 1 are the integers most likely to be valid as indices.
     if (value.dtype === 'int32') return [name, { ...value, data: numbers(value.data).map((x) => (x === 0 ? 1 : 0)) }];
     return [name, value];
   });
@@ -174,10 +179,13 @@ function otherInputs({ device, inputs }: StartOptions): OtherInputs {
 
 const numbers = (data: unknown): Float32Array | Int32Array => data as Float32Array | Int32Array;
 
-/** What no picture and no Gaussians hold in every place: 0.25 as float32, and twice as float16. A count of rows is none. */
+/**
+ * A bit pattern that no image and no Gaussians contain everywhere: 0.25 as float32, and twice as float16. Counts of
+ * rows keep 0.
+ */
 const QUARTERS = { float32: 0x3e80_0000, float16: 0x3400_3400, int32: 0 } as const;
 
-/** A buffer as that of a tensor, with one number in every place. */
+/** A buffer of the same size, filled with one number. */
 function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
   const size = Math.ceil(buffer.size / 4) * 4;
   const other = device.createBuffer({ label: 'gs.generator.other', size, usage: TENSOR_USAGE, mappedAtCreation: true });
@@ -188,7 +196,7 @@ function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
 
 interface Started {
   readonly session: LiveSession;
-  /** What its first run wrote. */
+  /** Output of its first run. */
   readonly written: WrittenRun;
 }
 
@@ -213,7 +221,7 @@ async function start(
   const written = await attempt(session, options, refusals, onOutputs);
   if (written) return { session, written };
   await session.release();
-  // Whatever broke the runtime would do so again: on the CPU, for one, what does not end would stop the page.
+  // A model that broke the runtime would do so again; on the CPU a run without end would block the page.
   if (runtime.isBroken) {
     options.onBreakage();
     throw new ContractError([runFault(model, refusals.join('; '))]);
@@ -221,7 +229,7 @@ async function start(
   return undefined;
 }
 
-/** One run, and pieces of what it wrote; undefined if it fails. @throws RuntimeGone, and then the session is released. */
+/** One run, and ranges of its output; undefined if it fails. @throws RuntimeGone, after releasing the session. */
 async function attempt(
   session: LiveSession,
   { device, inputs, model }: StartOptions,

@@ -1,17 +1,17 @@
-/** GPU buffers of tensors: how large they are, what they are for, and how they are read back. */
+/** GPU buffers of tensors: sizes, usages, and read-back. */
 
-/** Bytes of one element of the element types that inputs and outputs of generators have. */
+/** Bytes of one element, for the element types of generators. */
 export const ELEMENT_BYTES: Readonly<Record<string, number>> = { float32: 4, int32: 4, float16: 2, int64: 8 };
 
-/** Bytes of a GPU buffer for a tensor: the runtime copies in pieces of 16. */
+/** Bytes of a GPU buffer for a tensor: the runtime copies multiples of 16. */
 export function bufferBytes(dtype: string, elements: number): number {
   return Math.max(16, Math.ceil((elements * ELEMENT_BYTES[dtype]) / 16) * 16);
 }
 
-/** `GPUBufferUsage`, which does not exist where a module is merely imported: STORAGE, COPY_SRC and COPY_DST. */
+/** `GPUBufferUsage`, which is undefined if a module is imported outside a browser: STORAGE, COPY_SRC and COPY_DST. */
 export const TENSOR_USAGE = 0x80 | 0x4 | 0x8;
 
-/** A piece of a buffer: its beginning and its bytes are multiples of 4. */
+/** A range of a buffer: offset and length are multiples of 4. */
 export interface TensorPart {
   readonly buffer: GPUBuffer;
   /** Default 0. */
@@ -19,7 +19,7 @@ export interface TensorPart {
   readonly size: number;
 }
 
-/** Parts of buffers, copied at once and read when the GPU is done. For checks, never for frames. */
+/** Reads ranges of buffers back, copied in one submission. For checks, never for frames. */
 export async function readTensors(device: GPUDevice, parts: readonly TensorPart[]): Promise<Uint8Array[]> {
   const encoder = device.createCommandEncoder({ label: 'gs.generator.read' });
   // MAP_READ and COPY_DST.
