@@ -1,8 +1,9 @@
 #import shared/group
 
-// Converts an image to a tensor [views,channels,height,width]: red, green, blue and optional alpha planes in 0..1, top
-// row first. If sizes differ each pixel is a mean with triangular weights, as wide as the step between pixels
-// (antialiased bilinear); texels outside the image have no weight.
+// Converts an image to a tensor [views,channels,height,width]: depth, or red, green, blue and optional alpha planes in
+// 0..1, top row first. If sizes differ each pixel is a mean with triangular weights, as wide as the step between pixels
+// (antialiased bilinear); texels outside the image have no weight. Depth is that of the nearest texel: a mean of two
+// surfaces lies on neither.
 @group(0) @binding(0) var<uniform> image: ImageToTensor;
 @group(0) @binding(1) var picture: texture_2d<f32>;
 // float32, or two float16 in each word.
@@ -16,7 +17,7 @@ struct ImageToTensor {
   // Width and height of the tensor.
   size: vec2u,
   is_half: u32,
-  // 3, or 4 with alpha.
+  // 1 for depth, 3, or 4 with alpha.
   channels: u32,
   // Offset of this image in the tensor, in words.
   first_word: u32,
@@ -43,11 +44,19 @@ fn mean(at: vec2u, channel: u32) -> f32 {
   return clamp(sum / max(weights, 1e-20), 0.0, 1.0);
 }
 
+fn nearest(at: vec2u) -> f32 {
+  let center = vec2i(floor(image.corner + (vec2f(at) + 0.5) * image.step));
+  let last = vec2i(textureDimensions(picture)) - 1;
+  return textureLoad(picture, clamp(center, vec2i(0), last), 0).x;
+}
+
 fn element(index: u32) -> f32 {
   let plane = image.size.x * image.size.y;
   if (index >= image.channels * plane) { return 0.0; }
   let pixel = index % plane;
-  return mean(vec2u(pixel % image.size.x, pixel / image.size.x), index / plane);
+  let at = vec2u(pixel % image.size.x, pixel / image.size.x);
+  if (image.channels == 1u) { return nearest(at); }
+  return mean(at, index / plane);
 }
 
 @compute @workgroup_size(IMAGE_GROUP)

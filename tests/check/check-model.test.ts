@@ -65,7 +65,7 @@ for (const name of fixtureNames().filter((name) => !ENDLESS.includes(name))) {
     assert.deepEqual(codes(report), FAULTS[name] ?? []);
     const runs = report.sections.find(({ title }) => title === 'Runs');
     const isRun = !codes(report).some((code) => /run|inference|operator/.test(code));
-    const hasControls = /^(packed-sh-half|post(?!-temporal).*|link-.*|state)\.onnx$/.test(name);
+    const hasControls = /^(packed-sh-half|post(?!-temporal|-seen).*|link-.*|state)\.onnx$/.test(name);
     // Of models that know the time, six shares of it besides.
     const rows = runs?.rows.filter(([label]) => !label.endsWith(' of the time'));
     assert.equal(rows?.length, isRun ? (hasControls ? 5 : 3) : undefined);

@@ -95,6 +95,7 @@ const EVERYTHING: readonly Contract[] = [
       l: { role: 'gaussians', attribute: 'packed', color: 'sh', shOrder: 'channel-major', opacityActivation: 'logit' },
       n: { role: 'state', output: 'next', default: 0.5 },
       m: { role: 'image' },
+      depth: { role: 'depth' },
     },
     outputs: { layout: 'visionary', gaussians: 'g', sh: 'c', count: 'n' },
     nMax: 10,

@@ -85,6 +85,7 @@ function givenTensors(header: OnnxHeader, contract: Contract): Record<string, Sa
   for (const input of header.inputs) {
     const binding = contract.inputs[input.name];
     if (binding.role === 'image') tensors[input.name] = sampleImage(input);
+    if (binding.role === 'depth') tensors[input.name] = sampleDepth(input);
     if (binding.role === 'state') tensors[input.name] = sampleState(input, binding.default);
     if (binding.role === 'gaussians') tensors[input.name] = sampleGaussians(input, binding);
   }
@@ -107,6 +108,17 @@ function sampleImage(input: OnnxTensor): SampleTensor {
     input,
     dims,
     Array.from({ length: size }, (_, i) => (i % dims.at(-1)!) / dims.at(-1)!),
+  );
+}
+
+/** Nothing in the first columns, then a surface that recedes. */
+function sampleDepth(input: OnnxTensor): SampleTensor {
+  const dims = fixedDims(input, SAMPLE_PIXELS);
+  const [size, width] = [dims.reduce((product, dim) => product * dim, 1), dims.at(-1)!];
+  return toSample(
+    input,
+    dims,
+    Array.from({ length: size }, (_, i) => (4 * i < width ? 0 : 0.5 + (10 * (i % width)) / width)),
   );
 }
 

@@ -20,7 +20,10 @@ UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 def run(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = None) -> dict[str, AnyArray]:
     """All outputs of a model on the CPU provider; scales and opacities after the activations that it declares."""
     session = ort.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
-    given = {name: np.asarray(value, np.float32) for name, value in (feeds or {}).items()}
+    whole = {each.name for each in session.get_inputs() if each.type == "tensor(int32)"}
+    given = {
+        name: np.asarray(value, np.int32 if name in whole else np.float32) for name, value in (feeds or {}).items()
+    }
     names = [output.name for output in session.get_outputs()]
     written = dict(zip(names, session.run(None, given), strict=True))
     contract: Any = json.loads({prop.key: prop.value for prop in model.metadata_props}.get(METADATA_KEY, "{}"))

@@ -11,6 +11,7 @@ import pytest
 
 from gaussian_exporter.arrays import AnyArray, Doubles
 from gaussian_exporter.checkpoints.avatar_file import read_avatar
+from gaussian_exporter.checkpoints.body_model import read_skinned
 from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.avatar import Avatar, PoseFormat, export_avatar
 
@@ -186,3 +187,21 @@ def test_a_file_is_read_back(tmp_path: Path) -> None:
     np.savez(tmp_path / "avatar.npz", **arrays)
     with pytest.raises(ExportError, match=r"expected arrays weights.*\[checkpoint/incomplete\]"):
         read_avatar(tmp_path / "avatar.npz")
+
+
+def test_a_body_model_that_is_none_is_named(tmp_path: Path) -> None:
+    folder = Path(__file__).parents[3] / "tests/fixtures/oracles/avatar-smplx"
+    with np.load(folder / "model.npz") as archive:
+        arrays = dict(archive)
+    cloud = folder / "point_cloud.ply"
+    for change, said in (
+        ({"posedirs": None}, "no posedirs among"),
+        ({"weights": arrays["weights"][:, 1:]}, r"weights \(60, 6\)"),
+    ):
+        path = tmp_path / "model.npz"
+        np.savez(path, **{name: value for name, value in (arrays | change).items() if value is not None})
+        with pytest.raises(ExportError, match=said):
+            read_skinned(cloud, path)
+    few = read_skinned(cloud, folder / "model.npz", shapes=3, expressions=2)
+    assert few.shape_directions is not None and few.shape_directions.shape == (40, 3, 3)
+    assert few.expression_directions is not None and few.expression_directions.shape == (40, 3, 2)

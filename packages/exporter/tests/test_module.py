@@ -220,6 +220,26 @@ def test_a_temporal_filter_keeps_what_it_returns_second(tmp_path: Path) -> None:
         assert contract["outputs"] == {"layout": "image", "image": "processed"}
 
 
+class Fog(torch.nn.Module):  # type: ignore[misc]
+    """The post-processor of docs/guide/own-generator.md."""
+
+    def forward(self, image: Any, depth: Any, density: Any, color: Any) -> Any:
+        share = 1 - torch.exp(-density * depth)
+        return image * (1 - share) + color.reshape(1, 3, 1, 1) * share
+
+
+def test_a_post_processor_takes_the_depth_of_the_frame(tmp_path: Path) -> None:
+    inputs = {
+        "image": gs.image(16, 8),
+        "depth": gs.depth(16, 8),
+        "density": gs.control(0, 2, 0.2),
+        "color": gs.control(0, 1, [0.7, 0.75, 0.8], shape=[3]),
+    }
+    report = gs.export_module(Fog(), inputs, gs.image_output(), out=tmp_path / "fog.onnx", quiet=True)
+    assert contract_of(report.path)["inputs"]["depth"] == {"role": "depth"}
+    assert max(report.errors.values()) < 1e-5 and report.findings == []
+
+
 class Eye(torch.nn.Module):  # type: ignore[misc]
     """The place of the camera, -(R^T t), which ONNX Runtime's optimiser computes as -(R t)."""
 
@@ -519,3 +539,45 @@ def test_the_line_for_a_post_processor(tmp_path: Path) -> None:
     )
     words = 'src="scene.ply" postprocess="f.onnx" alt="&quot;A&quot; &amp; B" camera-controls'
     assert report.html() == f"<gaussian-splat {words}></gaussian-splat>"
+
+
+def test_largest_smallest_and_sign_stay_on_the_gpu(tmp_path: Path) -> None:
+    class Limits(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, t: Any) -> Any:
+            x = torch.linspace(-1, 1, COUNT)[:, None] * torch.ones(3) * t
+            places = (
+                torch.maximum(x, 0.3 * t)
+                + torch.minimum(x.flip(0), x**2)
+                + x.clamp(-0.5, 0.5).sign()
+                + t.clamp(0.2, 0.8)
+            )
+            covariances = 0.01 * torch.tensor([1.0, 0, 0, 1, 0, 1]).repeat(COUNT, 1)
+            return places, covariances, places.sigmoid(), torch.ones(COUNT, 1)
+
+    layout = gs.split("positions", "covariances", "colors", "opacities")
+    report = gs.export_module(Limits(), {"t": gs.time(2)}, layout, out=tmp_path / "x.onnx", quiet=True)
+    assert max(report.errors.values()) < 1e-6
+    assert [str(found) for found in report.findings] == []
+    used = {node.op_type for node in onnx.load(report.path).graph.node}
+    assert not used & {"Max", "Min", "Sign"}
+
+
+def test_the_diffusion_of_the_guide_converges_in_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    guide = (Path(__file__).parents[3] / "docs/guide/own-generator.md").read_text()
+    code = next(part for part in guide.split("```python\n") if "class Diffusion" in part).split("```")[0]
+    monkeypatch.chdir(tmp_path)
+    scope: dict[str, Any] = {}
+    exec(code, scope)
+    model, count, points = onnx.load("diffusion.onnx"), scope["N"], scope["Diffusion"]().data[:, :3].numpy()
+    ends = []
+    for seed in (0, 1):
+        kept = np.zeros((count + 1, 3), np.float32)
+        far = []
+        for time in np.linspace(0, scope["SECONDS"], 40):
+            written = run(model, {"t": np.array([time]), "seed": np.array([seed], np.int32), "previous": kept})
+            kept = next(values for name, values in written.items() if values.shape == kept.shape)
+            nearest = np.sqrt(((written["positions"][::16, None] - points) ** 2).sum(2)).min(1)
+            far.append(nearest.mean())
+        assert far[0] > 0.4 and far[-1] < 0.03, far
+        ends.append(written["positions"])
+    assert np.abs(ends[0] - ends[1]).max() > 0.5

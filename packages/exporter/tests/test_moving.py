@@ -444,3 +444,20 @@ def test_files_of_a_deform_network(tmp_path: Path) -> None:
     at = {"time": np.array([0.3])}
     first, second = (run(export_deformable(cloud(COUNT, 3), one, FACTS), at) for one in (model, again))
     assert all(np.array_equal(first[name], second[name]) for name in first)
+
+
+@pytest.mark.parametrize(
+    ("entry", "name", "network"),
+    [
+        ("state_dict", "encoder.epipolar_transformer.transformer.layers.0.0.norm.weight", "pixelSplat"),
+        ("state_dict", "encoder.depth_predictor.corr_refine_net.0.weight", "MVSplat"),
+        ("model_state_dict", "network_with_offset.out.weight", "Splatter Image"),
+        ("", "gs_tokens", "TokenGS"),
+    ],
+)
+def test_weights_of_networks_are_refused_by_name(tmp_path: Path, entry: str, name: str, network: str) -> None:
+    torch: Any = pytest.importorskip("torch")
+    state = {name: torch.zeros(3)}
+    torch.save({entry: state, "global_step": 3} if entry else state, tmp_path / "last.ckpt")
+    with pytest.raises(ExportError, match=rf"a checkpoint of {network}\. .*export_module"):
+        read_cloud(tmp_path / "last.ckpt")

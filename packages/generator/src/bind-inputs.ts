@@ -13,8 +13,8 @@ import type { InputNumbers } from './input-value.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * Values of a generator's inputs, in the conventions of its contract. Inputs with the roles `gaussians`, `image` and
- * `state` are excluded: their tensors come from another generator, from an image or from the previous run.
+ * Values of a generator's inputs, in the conventions of its contract. Inputs with the roles `gaussians`, `image`,
+ * `depth` and `state` are excluded: their tensors come from another generator, from an image or from the previous run.
  *
  * @param header Header of a valid file (`checkContract` found nothing); for a model of several instances that of one
  * (`oneInstance`).
@@ -29,15 +29,21 @@ export function bindInputs(
   const values: Record<string, InputNumbers> = {};
   for (const input of header.inputs) {
     const binding = contract.inputs[input.name];
-    if (binding.role === 'gaussians' || binding.role === 'image' || binding.role === 'state') continue;
+    if (isGiven(binding)) continue;
     values[input.name] = toTensor(input, numbersOf(input, binding, contract, state));
   }
   return values;
 }
 
+/** Roles of inputs whose tensors are made elsewhere. */
+type GivenInput = Extract<InputBinding, { role: 'gaussians' | 'image' | 'depth' | 'state' }>;
+
+const isGiven = (binding: InputBinding): binding is GivenInput =>
+  ['gaussians', 'image', 'depth', 'state'].includes(binding.role);
+
 function numbersOf(
   input: OnnxTensor,
-  binding: Exclude<InputBinding, { role: 'gaussians' | 'image' | 'state' }>,
+  binding: Exclude<InputBinding, GivenInput>,
   contract: Contract,
   state: GeneratorState,
 ): ArrayLike<number> {

@@ -5,7 +5,7 @@ import { elementsOf, type GpuTensor } from './input-value.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * Images for the inputs with the role `image`.
+ * Images for the inputs with the role `image`, and the depth of the frame.
  * @param given Inputs that a previous model writes, which the state may omit.
  * @throws GaussianSplatError `argument/value` for an image that is missing, or has another size or element type than
  * the input.
@@ -18,10 +18,11 @@ export function bindPictures(
 ): Record<string, GpuTensor> {
   const pictures: Record<string, GpuTensor> = {};
   for (const input of header.inputs) {
-    if (contract.inputs[input.name].role !== 'image' || given.has(input.name)) continue;
-    const picture = state.pictures?.[input.name];
-    if (picture === undefined) throw missing(input);
-    if (!fits(picture, input)) throw misfit(picture, input);
+    const { role } = contract.inputs[input.name];
+    if ((role !== 'image' && role !== 'depth') || given.has(input.name)) continue;
+    const picture = role === 'depth' ? state.depth : state.pictures?.[input.name];
+    if (picture === undefined) throw missing(input, role);
+    if (!fits(picture, input)) throw misfit(picture, input, role);
     // Copied, because the owner may modify it.
     const { buffer, dtype, dims, version } = picture;
     pictures[input.name] = { buffer, dtype, dims: dimsFor(input, dims), version };
@@ -46,30 +47,42 @@ function dimsFor({ dims: sizes = [] }: OnnxTensor, dims: readonly number[]): num
   return sizes.map((size, i) => (typeof size === 'number' ? size : dims[before + i]));
 }
 
-/** Requirements of an input with the role `image`: planes, number of images, and the sizes that the file fixes. */
+/** Planes of a depth, of colors, and of colors with alpha. */
+const CHANNELS = [1, 3, 4] as const;
+
+/** Requirements of an input with the role `image` or `depth`: planes, number of images, and the sizes that the file fixes. */
 export function imageShapeOf({ dims = [], dtype }: OnnxTensor): {
   readonly width: number | undefined;
   readonly height: number | undefined;
   readonly dtype: 'float32' | 'float16';
-  readonly channels: 3 | 4;
+  readonly channels: 1 | 3 | 4;
   readonly views: number;
 } {
   const [height, width] = dims.slice(-2).map((size) => (typeof size === 'number' ? size : undefined));
   const views = dims.slice(0, -3).reduce<number>((product, size) => product * Number(size), 1);
-  return { width, height, dtype: dtype as 'float32' | 'float16', channels: dims.at(-3) === 4 ? 4 : 3, views };
+  return {
+    width,
+    height,
+    dtype: dtype as 'float32' | 'float16',
+    channels: CHANNELS.find((channels) => channels === dims.at(-3)) ?? 3,
+    views,
+  };
 }
 
-const missing = (input: OnnxTensor): GaussianSplatError =>
+const missing = (input: OnnxTensor, role: 'image' | 'depth'): GaussianSplatError =>
   new GaussianSplatError('argument/value', {
-    where: `input ${input.name} (image)`,
-    expected: `an image for ${describeTensor(input)}`,
+    where: `input ${input.name} (${role})`,
+    expected: `${role === 'depth' ? 'the depth of a frame' : 'an image'} for ${describeTensor(input)}`,
     found: 'none',
-    remedy: `give one: control-${input.name.toLowerCase()}="photo.jpg" on the element, or images in the state of the generator`,
+    remedy:
+      role === 'depth'
+        ? 'give one: depth in the state of the post-processor'
+        : `give one: control-${input.name.toLowerCase()}="photo.jpg" on the element, or images in the state of the generator`,
   });
 
-const misfit = ({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor): GaussianSplatError =>
+const misfit = ({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor, role: string): GaussianSplatError =>
   new GaussianSplatError('argument/value', {
-    where: `input ${input.name} (image)`,
+    where: `input ${input.name} (${role})`,
     expected: describeTensor(input),
     found: `${dtype} [${dims.join(', ')}] in a buffer of ${buffer.size} bytes`,
     remedy: 'make the image in the size and element type of the input',

@@ -42,6 +42,8 @@ interface RunRequest {
 export class PostProcessor {
   /** The input for the image. */
   readonly input: ImageInput;
+  /** The input that takes the depth of the frame; undefined where no model has one. */
+  readonly depth: ImageInput | undefined;
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;
   readonly #loop: RunLoop<RunRequest>;
@@ -54,6 +56,7 @@ export class PostProcessor {
     this.#chain = chain;
     this.#options = options;
     this.input = pictureInput(chain.models);
+    this.depth = depthInput(chain.models);
     this.#loop = new RunLoop({
       queue: chain.device.queue,
       isDue: ({ inputs }) => !this.#isShown(inputs) || this.isConverging,
@@ -121,6 +124,7 @@ export class PostProcessor {
    * Requests the processed image. A request that has not started yet is replaced; one with the inputs of the last run
    * is skipped, but models with state run it 32 times, until they converge.
    * @param picture Image for {@link input}; its `version` identifies its content.
+   * @param state With `depth` if a model takes it: see {@link depth}.
    * @throws GaussianSplatError `argument/value` if the image or the state does not match the model.
    */
   request(picture: GpuTensor, state: GeneratorState = {}): void {
@@ -171,6 +175,23 @@ function pictureInput(models: readonly GeneratorModel[]): ImageInput {
   if (faults.length > 0) throw new ContractError(faults);
   const [input] = inputs;
   return { name: input.name, ...imageShapeOf(input) };
+}
+
+/** The depth that models of a chain take is one tensor: all must take it in one size and element type. */
+function depthInput(models: readonly GeneratorModel[]): ImageInput | undefined {
+  const inputs = models.flatMap((model) =>
+    model.header.inputs
+      .filter(({ name }) => model.contract.inputs[name].role === 'depth')
+      .map((input) => ({ model, input: { name: input.name, ...imageShapeOf(input), channels: 1 as const } })),
+  );
+  const sizeOf = ({ width, height, dtype }: ImageInput): string => `${dtype} [1,1,${height ?? 'H'},${width ?? 'W'}]`;
+  const faults = inputs
+    .filter(({ input }) => sizeOf(input) !== sizeOf(inputs[0].input))
+    .map(({ model, input }) =>
+      unsuitable(model, `depth as ${sizeOf(inputs[0].input)}, as another takes it`, sizeOf(input)),
+    );
+  if (faults.length > 0) throw new ContractError(faults);
+  return inputs.at(0)?.input;
 }
 
 const unsuitable = ({ header }: GeneratorModel, expected: string, found: string): ContractFault => ({

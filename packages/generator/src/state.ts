@@ -27,4 +27,6 @@ export interface GeneratorState {
    * required by every such input that no earlier model of a chain writes.
    */
   readonly pictures?: Readonly<Record<string, GpuTensor>>;
+  /** Depth [1,1,H,W] of the frame that a post-processor takes, for example made by the renderer's `ImageTensor`; needed by inputs with the role `depth`. */
+  readonly depth?: GpuTensor;
 }

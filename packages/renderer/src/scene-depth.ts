@@ -39,8 +39,8 @@ export interface SceneDepthOptions {
   readonly host?: HostDepth | undefined;
   /**
    * Receives the median depth of the splats, which halves the transmittance, in world units along the optical axis; 0
-   * if more light passes. Same size as the target, format `r32float`, usage STORAGE_BINDING. Requires the rasterizer
-   * `tiles`.
+   * if more light passes. Same size as the target, format `r32float`, usage STORAGE_BINDING. Frames of fewer
+   * pixels fill its upper left corner: {@link SceneDepth.drawn}. Requires the rasterizer `tiles`.
    */
   readonly out?: GPUTexture | undefined;
 }
@@ -69,6 +69,7 @@ export class SceneDepth implements PaintingDepth {
   readonly #tiles = new BoundImages();
   readonly #layerViews: Readonly<Record<'layer_color' | 'second_depth' | 'second_color', GPUTextureView>>;
   #layerBindings: GPUBindGroup | undefined;
+  #drawn = { width: 0, height: 0 };
   #quads: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
 
   /** @throws GaussianSplatError `argument/value` for a texture that cannot be read or written. */
@@ -103,9 +104,15 @@ export class SceneDepth implements PaintingDepth {
     const host = this.#host;
     if (auxiliary) throw wrong('FrameTarget.depth', 'no depth in a frame with auxiliary outputs', 'both');
     if (this.#outTexture) requireRoom(this.#outTexture, width, height, rasterizer);
+    this.#drawn = { width, height };
     const scale = host ? [host.texture.width / width, host.texture.height / height] : [1, 1];
     writeStruct(layouts.SceneDepth, { ...readingOf(host, camera), scale }, this.#bytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#bytes);
+  }
+
+  /** Pixels of the last frame: its settings, or the device's limits, may make it smaller than its target. */
+  get drawn(): { readonly width: number; readonly height: number } {
+    return this.#drawn;
   }
 
   get overrides(): Overrides {
@@ -231,8 +238,8 @@ function requireRoom(out: GPUTexture, width: number, height: number, rasterizer:
       found: rasterizer,
       remedy: "draw with settings('default', { rasterizer: 'tiles' })",
     });
-  if (out.width === width && out.height === height) return;
-  const expected = `a texture of ${width} x ${height} pixels, as many as are drawn`;
+  if (out.width >= width && out.height >= height) return;
+  const expected = `a texture of at least ${width} x ${height} pixels, as many as are drawn`;
   throw wrong('SceneDepth.out', expected, `${out.width} x ${out.height}`);
 }
 

@@ -28,6 +28,7 @@ export function checkContract(file: OnnxHeader, contract: Contract, options: Che
     ...checkInstances(file, contract),
     ...header.inputs.flatMap((input) => checkInput(input, contract, header)),
     ...missingInputs(header, contract),
+    ...inputsOfOtherModels(contract),
     ...checkOutputTensors(header, contract.outputs),
     ...checkGaussians(header, contract),
   ];
@@ -69,6 +70,24 @@ function missingInputs(header: OnnxHeader, { inputs }: Contract): ContractFault[
         ? optionalInput(name, inputs[name].role)
         : missingTensor('input', name, inputs[name].role, header.inputs),
     );
+}
+
+/** Only post-processors receive the depth of a frame, and only generators the Gaussians of the one before them. */
+function inputsOfOtherModels({ inputs, outputs }: Contract): ContractFault[] {
+  const isPost = outputs.layout === 'image';
+  const role = isPost ? 'gaussians' : 'depth';
+  return Object.keys(inputs)
+    .filter((name) => inputs[name].role === role)
+    .map((name) => ({
+      code: 'contract/schema',
+      tensor: name,
+      where: `input ${name} (${role})`,
+      expected: isPost ? 'a generator, which follows another in a chain' : 'a post-processor, with the layout image',
+      found: `a model with the layout ${outputs.layout}`,
+      remedy: isPost
+        ? 'give a post-processor the depth of the frame: an input with the role depth'
+        : 'remove the input: no frame is drawn before a generator runs',
+    }));
 }
 
 /** ONNX allows callers to override such a default, but onnxruntime-web rejects that. */

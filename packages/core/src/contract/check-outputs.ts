@@ -43,10 +43,8 @@ export function checkOutputs(contract: Contract, outputs: Readonly<Record<string
   const { live, countFaults } = liveRows(contract.outputs.count, outputs, most);
   const readers = slices.map((slice) => readerOf(slice, outputs[slice.tensor]));
   const rowFaults = collectRowFaults(readers, live);
-  const bounds = boundsOf(
-    readers.find(({ attribute }) => attribute === 'positions')!,
-    live,
-  );
+  const of = (name: string): RowReader => readers.find(({ attribute }) => attribute === name)!;
+  const bounds = boundsOf(of('positions'), of('opacities'), live);
   return {
     faults: [...countFaults, ...rowFaults],
     rows,
@@ -221,10 +219,16 @@ function collectRowFaults(readers: readonly RowReader[], live: number): Contract
   }));
 }
 
-function boundsOf({ read }: RowReader, live: number): OutputReport['bounds'] {
+/** Opacities below this are not drawn: they change no pixel of 8 bits. */
+const LEAST_OPACITY = 1 / 255;
+
+/** Corners around the finite centers of the rows that are drawn. */
+function boundsOf({ read }: RowReader, opacities: RowReader, live: number): OutputReport['bounds'] {
+  const least = opacities.activation === 'logit' ? Math.log(LEAST_OPACITY / (1 - LEAST_OPACITY)) : LEAST_OPACITY;
   const min: [number, number, number] = [Infinity, Infinity, Infinity];
   const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
   for (let row = 0; row < live; row++) {
+    if (opacities.read(row, 0) < least) continue;
     for (let axis = 0; axis < 3; axis++) {
       const value = read(row, axis);
       if (!Number.isFinite(value)) continue;

@@ -211,6 +211,14 @@ export interface ImageInput {
   readonly role: 'image';
 }
 
+/**
+ * Of a post-processor. [1,1,H,W] float32 or float16: the depth of the frame along the camera's axis, in world units, at which half of the light is gone, top row
+ * first; 0 where more than half passes.
+ */
+export interface DepthInput {
+  readonly role: 'depth';
+}
+
 /** Role of one input of the ONNX file. */
 export type InputBinding =
   | ViewInput
@@ -228,7 +236,8 @@ export type InputBinding =
   | ControlInput
   | StateInput
   | GaussiansInput
-  | ImageInput;
+  | ImageInput
+  | DepthInput;
 
 /** Attributes of a Gaussian. */
 export type GaussianAttribute = 'positions' | 'covariances' | 'scales' | 'rotations' | 'colors' | 'sh' | 'opacities';

@@ -12,7 +12,7 @@ export interface OutputTensor {
 }
 
 /** Inputs from another model or from an image: all instances of a run share them. */
-const SHARED_ROLES: readonly string[] = ['gaussians', 'image', 'state'];
+const SHARED_ROLES: readonly string[] = ['gaussians', 'image', 'depth', 'state'];
 
 /** Whether a tensor has a row for each instance: its first dimension is then the axis that the contract names. */
 export function hasInstances({ dims }: Pick<OnnxTensor, 'dims'>, { instances }: Contract): boolean {

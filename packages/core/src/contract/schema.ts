@@ -188,6 +188,11 @@ const input: Schema = {
       'image',
       '[1,3,H,W] float32 or float16: red, green and blue planes in 0..1; [1,4,H,W] with alpha, [V,3,H,W] of V images',
     ),
+    variant(
+      'role',
+      'depth',
+      '[1,1,H,W] float32 or float16, of a post-processor: depth along the axis of the camera in world units at which half of the light is gone; 0 where more passes',
+    ),
   ],
 };
 

@@ -59,6 +59,8 @@ export function inputRule(binding: InputBinding): TensorRule | undefined {
       return fixed(['float32'], ['B']);
     case 'image':
       return fixed(FLOATS, ...IMAGE_SHAPES, ['V', 3, 'H', 'W'], ['V', 4, 'H', 'W']);
+    case 'depth':
+      return fixed(FLOATS, [1, 1, 'H', 'W'], [1, 'H', 'W'], ['H', 'W']);
     case 'gaussians':
       // Another model's count is computed in GPU memory, which has no 64-bit integers.
       return binding.attribute === 'count' ? one(['int32']) : gaussianRule(binding.attribute, binding);

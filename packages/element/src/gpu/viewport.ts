@@ -94,7 +94,16 @@ export class Viewport implements Painter {
     const { quality, shDegree, order } = this.#rendering;
     // Whichever leaves out more: what the page asks for, or the pace.
     const most = Math.max(detail, settings?.detail ?? 0);
-    return { quality, shDegree, order, submissions: this.#submissions, ...settings, detail: most, splatBudget };
+    return {
+      quality,
+      shDegree,
+      order,
+      submissions: this.#submissions,
+      ...settings,
+      ...this.#filter?.settings,
+      detail: most,
+      splatBudget,
+    };
   }
 
   get isPrepared(): boolean {
@@ -141,8 +150,8 @@ export class Viewport implements Painter {
     const settings = this.#settings(frame.settings);
     const { filter } = this.#rendering;
     const draw = (drawn: Frame): void => {
-      const { camera, target, background: over } = drawn;
-      this.viewpoint.draw(camera, { target, over, filter, ...this.#contents.drawBeneath?.(drawn) }, settings);
+      const { camera, target, background: over, depth } = drawn;
+      this.viewpoint.draw(camera, { target, over, filter, depth, ...this.#contents.drawBeneath?.(drawn) }, settings);
     };
     if (this.#filter) this.#filter.render(frame, `${content} ${filter} ${JSON.stringify(settings)}`, draw);
     else draw(frame);

@@ -9,7 +9,7 @@ export interface GeneratorInput {
    * `control`, `shape`, `image`: set by `control-NAME` or `inputValues`; `pose`: by `pose`; `time`, `frame`: by `currentTime`. Others, such as `view`, are fed by the
    * element itself.
    */
-  readonly role: Exclude<InputBinding['role'], 'gaussians' | 'state'>;
+  readonly role: Exclude<InputBinding['role'], 'gaussians' | 'depth' | 'state'>;
   /** For readers. */
   readonly label: string;
   /** Numbers that it takes; of an image 0. */
@@ -37,7 +37,7 @@ export function inputsOf(models: readonly GeneratorModel[]): readonly GeneratorI
   for (const { header, contract } of models) {
     for (const { name, dims = [], dtype } of header.inputs) {
       const { role, ...details } = contract.inputs[name];
-      if (role === 'gaussians' || role === 'state' || found.has(name)) continue;
+      if (role === 'gaussians' || role === 'depth' || role === 'state' || found.has(name)) continue;
       const numbers = dims.filter((dim) => typeof dim === 'number');
       const views = role === 'image' ? numbers.slice(0, -3).reduce((product, dim) => product * dim, 1) : undefined;
       found.set(name, {

@@ -43,6 +43,7 @@ export class PostView implements FrameFilter {
   readonly #pictures: LivePictures;
   #surface: FilteredFrame | undefined;
   #tensor: GpuTensor | undefined;
+  #depth: GpuTensor | undefined;
   /** The surface that a run on its way will paint. */
   #pending: FilteredFrame | undefined;
   /** What was drawn last, what was handed to the processor, and what it has made a picture of. */
@@ -97,6 +98,11 @@ export class PostView implements FrameFilter {
     return (view = new PostView(device, request, post));
   }
 
+  /** Only the rasterizer `tiles` writes depth. */
+  get settings(): FrameFilter['settings'] {
+    return this.#post.depth && { rasterizer: 'tiles' };
+  }
+
   get byteLength(): number {
     return this.#surface?.byteLength ?? 0;
   }
@@ -109,7 +115,7 @@ export class PostView implements FrameFilter {
   render(frame: Frame, content: string, draw: (frame: Frame) => void): void {
     const surface = this.#surfaceFor(frame);
     const key = `${content} ${JSON.stringify(frame.camera)} ${String(frame.background)}`;
-    if (key !== this.#drawn) draw({ ...frame, target: surface.drawn });
+    if (key !== this.#drawn) draw({ ...frame, target: surface.drawn, depth: surface.depth });
     this.#drawn = key;
     if (!this.#post.isBusy && this.#isDue(key)) this.#offer(surface, frame, key);
     surface.present(this.#shows(key) ? 'filtered' : 'drawn', frame.target);
@@ -137,8 +143,8 @@ export class PostView implements FrameFilter {
   #surfaceFor({ camera: { width, height } }: Frame): FilteredFrame {
     if (this.#surface?.width === width && this.#surface.height === height) return this.#surface;
     this.#retire(this.#surface);
-    this.#surface = new FilteredFrame(this.#device, width, height);
-    this.#tensor = undefined;
+    this.#surface = new FilteredFrame(this.#device, width, height, this.#post.depth !== undefined);
+    this.#tensor = this.#depth = undefined;
     this.#drawn = this.#handed = this.#filtered = '';
     return this.#surface;
   }
@@ -167,14 +173,20 @@ export class PostView implements FrameFilter {
     if (this.#tensor === undefined || this.#handed !== this.#drawn) {
       const { width = surface.width, height = surface.height, dtype, channels } = input;
       this.#tensor = surface.handOver({ width, height, dtype, channels });
+      const { depth } = this.#post;
+      this.#depth =
+        depth &&
+        surface.handOverDepth({
+          width: depth.width ?? surface.width,
+          height: depth.height ?? surface.height,
+          dtype: depth.dtype,
+        });
       this.#handed = this.#drawn;
     }
     this.#pending = surface;
     try {
-      this.#post.request(
-        this.#tensor,
-        this.#reader.read(state, camera, this.#pictures.tensors, this.#request.others()),
-      );
+      const read = this.#reader.read(state, camera, this.#pictures.tensors, this.#request.others());
+      this.#post.request(this.#tensor, { ...read, depth: this.#depth });
     } catch (error) {
       this.#request.onError(error);
     }

@@ -14,6 +14,7 @@ import onnx
 from google.protobuf.message import DecodeError
 
 from .checkpoints.avatar_file import read_avatar
+from .checkpoints.body_model import read_skinned
 from .checkpoints.clouds import read_cloud
 from .checkpoints.files import existing
 from .checkpoints.hexplane_folder import read_hexplane
@@ -203,6 +204,10 @@ def _scaffold_options(family: Command) -> None:
 
 def _avatar_options(family: Command) -> None:
     family.add_argument("--pose", choices=get_args(PoseFormat), default="axis-angle")
+    what = "body model of SMPL, SMPL-H, SMPL-X or FLAME; the checkpoint is then Gaussians in its rest pose"
+    family.add_argument("--smplx", type=Path, metavar="MODEL.npz", help=what)
+    family.add_argument("--shapes", type=positive, default=10, help="with --smplx: coefficients of the body's shape")
+    family.add_argument("--expressions", type=positive, default=10, help="with --smplx: coefficients of expressions")
 
 
 def _no_options(family: Command) -> None:
@@ -246,7 +251,11 @@ def _gaussian4d(given: argparse.Namespace, facts: Facts, options: Options) -> on
 
 
 def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_avatar(read_avatar(given.checkpoint, given.ignore), facts, options, cast(PoseFormat, given.pose))
+    if given.smplx is None:
+        avatar = read_avatar(given.checkpoint, given.ignore)
+    else:
+        avatar = read_skinned(given.checkpoint, given.smplx, given.ignore, given.shapes, given.expressions)
+    return export_avatar(avatar, facts, options, cast(PoseFormat, given.pose))
 
 
 def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
@@ -299,7 +308,7 @@ FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
         "4D Gaussian Splatting (4D covariances): chkpnt*.pth, cfg_args beside it",
         _gaussian4d,
     ),
-    "avatar": (_avatar_options, "a skinned avatar: one .npz file", _avatar),
+    "avatar": (_avatar_options, "a skinned avatar: one .npz file, or Gaussians and --smplx", _avatar),
     "feed-forward": (
         _feed_forward_options,
         "pictures to Gaussians: a folder of config.json and model.pth",

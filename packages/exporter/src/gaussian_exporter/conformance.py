@@ -48,6 +48,10 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
         )
     if binding.get("format") == "matrix" and "default" not in binding:
         return np.tile(np.eye(3).reshape(-1), _flat(shape) // 9).astype(dtype).reshape(shape)
+    if binding["role"] == "depth":
+        # Nothing in the first columns, then a surface that recedes.
+        across = np.linspace(0, 1, shape[-1], endpoint=False)
+        return np.broadcast_to(np.where(across < 0.25, 0, 0.5 + 10 * across), shape).astype(dtype)
     if binding["role"] == "image":
         return np.random.default_rng(0).random(shape).astype(dtype)
     return np.broadcast_to(np.asarray(binding.get("default", 0.0)).astype(dtype).reshape(-1), _flat(shape)).reshape(

@@ -43,6 +43,7 @@ _INPUTS: dict[str, tuple[list[Sequence[int | str]], Sequence[str]]] = {
     "frame": (_ONE, _INTEGERS),
     "seed": (_ONE, _INTEGERS),
     "shape": ([("B",)], ("float32",)),
+    "depth": ([(1, 1, "H", "W"), (1, "H", "W"), ("H", "W")], _FLOATS),
     "image": ([*_IMAGES, ("V", 3, "H", "W"), ("V", 4, "H", "W")], _FLOATS),
 }
 Dims = tuple[int | str | None, ...]
@@ -211,7 +212,20 @@ def _tensors(model: onnx.ModelProto, contract: Mapping[str, Any]) -> Iterator[Fa
     for name, binding in contract["inputs"].items():
         if name not in inputs:
             yield _missing("input", name, binding["role"], inputs)
+        yield from _of_another_model(name, binding["role"], contract["outputs"]["layout"])
     yield from _outputs(outputs, contract)
+
+
+def _of_another_model(name: str, role: str, layout: str) -> Iterator[Fault]:
+    """Only post-processors receive the depth of a frame, and only generators the Gaussians of the one before them."""
+    is_post = layout == "image"
+    if role != ("gaussians" if is_post else "depth"):
+        return
+    expected = "a generator, which follows another in a chain" if is_post else "a post-processor, with the layout image"
+    remedy = "give a post-processor the depth of the frame: an input with the role depth"
+    if not is_post:
+        remedy = "remove the input: no frame is drawn before a generator runs"
+    yield _fault("schema", name, f"input {name} ({role})", expected, f"a model with the layout {layout}", remedy)
 
 
 def _input(tensor: Tensor, binding: Mapping[str, Any], outputs: Mapping[str, Tensor]) -> Iterator[Fault]:

@@ -256,10 +256,22 @@ _RULES: dict[str, tuple[Any, FaultCode, str, str]] = {
 }
 
 
+# Opacities below this are not drawn: they change no pixel of 8 bits.
+_LEAST_OPACITY = 1 / 255
+
+
 def box_of(attributes: Attributes) -> tuple[AnyArray, AnyArray] | None:
-    """Corners around the finite centres; None where there are none."""
-    centres = attributes["positions"].rows.astype(np.float64) if "positions" in attributes else np.zeros((0, 3))
-    centres = centres[np.isfinite(centres).all(1)]
+    """Corners around the finite centers of the rows that are drawn; None if there are none."""
+    if "positions" not in attributes:
+        return None
+    centres = attributes["positions"].rows.astype(np.float64)
+    shown = np.isfinite(centres).all(1)
+    if "opacities" in attributes:
+        opacities = attributes["opacities"]
+        is_logit = opacities.activation == "logit"
+        least = np.log(_LEAST_OPACITY / (1 - _LEAST_OPACITY)) if is_logit else _LEAST_OPACITY
+        shown &= ~(opacities.rows.reshape(-1).astype(np.float64) < least)
+    centres = centres[shown]
     return (centres.min(0), centres.max(0)) if len(centres) else None
 
 

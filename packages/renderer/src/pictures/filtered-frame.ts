@@ -3,6 +3,7 @@ import * as layouts from '../generated/live-layouts.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { FullScreenStage } from '../stages/full-screen.js';
+import { SceneDepth } from '../scene-depth.js';
 import { ImageTensor, type ImageShape } from './picture-tensor.js';
 
 /** An output image of a model on the GPU. */
@@ -34,6 +35,10 @@ export class FilteredFrame {
   readonly height: number;
   /** Target for the renderer. */
   readonly drawn: GPUTexture;
+  /** Of the drawn frame, for its target; undefined where no model takes depth. */
+  readonly depth: SceneDepth | undefined;
+  readonly #depthTexture: GPUTexture | undefined;
+  #depthTensor: ImageTensor | undefined;
   readonly #device: GPUDevice;
   readonly #handed: GPUTexture;
   readonly #filtered: GPUTexture;
@@ -45,7 +50,8 @@ export class FilteredFrame {
   readonly #filteredView: GPUTextureView;
   #tensor: ImageTensor | undefined;
 
-  constructor(device: GPUDevice, width: number, height: number) {
+  /** @param takesDepth whether the model takes the depth of the frame, too: frames are then drawn with `depth`, by the rasterizer `tiles` */
+  constructor(device: GPUDevice, width: number, height: number, takesDepth = false) {
     this.width = width;
     this.height = height;
     this.#device = device;
@@ -53,6 +59,15 @@ export class FilteredFrame {
     this.#handed = this.#texture('handed', TEXTURE_USAGE.copyDestination);
     this.#filtered = this.#texture('filtered', 0);
     this.#filteredView = this.#filtered.createView();
+    if (takesDepth) {
+      this.#depthTexture = device.createTexture({
+        label: 'gs.filter.depth',
+        size: [width, height],
+        format: 'r32float',
+        usage: TEXTURE_USAGE.textureBinding | TEXTURE_USAGE.storageBinding,
+      });
+      this.depth = new SceneDepth(device, { out: this.#depthTexture });
+    }
     this.#present = new FullScreenStage(device, present);
     this.#paint = new FullScreenStage(device, tensorToImage);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
@@ -65,7 +80,9 @@ export class FilteredFrame {
 
   /** Bytes of allocated GPU memory. */
   get byteLength(): number {
-    return 3 * PIXEL_BYTES * this.width * this.height + this.#uniform.size + (this.#tensor?.byteLength ?? 0);
+    const tensors = (this.#tensor?.byteLength ?? 0) + (this.#depthTensor?.byteLength ?? 0);
+    const pixelBytes = 3 * PIXEL_BYTES + (this.depth ? 4 : 0);
+    return pixelBytes * this.width * this.height + this.#uniform.size + tensors;
   }
 
   /**
@@ -85,6 +102,17 @@ export class FilteredFrame {
     this.#device.queue.submit([encoder.finish()]);
     this.#tensor!.write(this.#handed);
     return this.#tensor!;
+  }
+
+  /** Copies the depth of the drawn frame into a tensor [1,1,height,width] for the model. It stays as it is until the next call. */
+  handOverDepth({ width, height, dtype }: Pick<ImageShape, 'width' | 'height' | 'dtype'>): ImageTensor {
+    const { shape } = this.#depthTensor ?? {};
+    if (shape?.width !== width || shape.height !== height || shape.dtype !== dtype) {
+      this.#depthTensor?.destroy();
+      this.#depthTensor = new ImageTensor(this.#device, { width, height, dtype, channels: 1 });
+    }
+    this.#depthTensor!.write(this.#depthTexture!, 'stretch', 0, this.depth!.drawn);
+    return this.#depthTensor!;
   }
 
   /** Accepts the model's output for the last input frame; submits its work before it returns. */
@@ -111,6 +139,9 @@ export class FilteredFrame {
   destroy(): void {
     for (const texture of [this.drawn, this.#handed, this.#filtered]) texture.destroy();
     this.#uniform.destroy();
+    this.depth?.destroy();
+    this.#depthTexture?.destroy();
+    this.#depthTensor?.destroy();
     this.#tensor?.destroy();
     this.#bindings.clear();
   }

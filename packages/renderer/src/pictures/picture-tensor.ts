@@ -11,8 +11,8 @@ export interface ImageShape {
   readonly width: number;
   readonly height: number;
   readonly dtype: 'float32' | 'float16';
-  /** 4 with alpha. Default 3. */
-  readonly channels?: 3 | 4;
+  /** 4 with alpha; 1 for depth, which is copied from the nearest texel. Default 3. */
+  readonly channels?: 1 | 3 | 4;
   /** Number of images in the tensor. Default 1. */
   readonly views?: number;
 }
@@ -31,7 +31,7 @@ export type ImageFit = 'stretch' | 'cover';
 export class ImageTensor {
   readonly shape: ImageShape;
   /** [views, channels, height, width] */
-  readonly dims: readonly [number, 3 | 4, number, number];
+  readonly dims: readonly [number, 1 | 3 | 4, number, number];
   /** The elements; two float16 in each word. */
   readonly buffer: GPUBuffer;
   readonly #device: GPUDevice;
@@ -83,9 +83,15 @@ export class ImageTensor {
    * Writes an image from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is
    * read back. Textures with alpha hold premultiplied colors.
    * @param view Index of the image in the tensor, from 0.
+   * @param part Pixels of the texture that are the image, from its upper left corner; default all.
    */
-  write(texture: GPUTexture, fit: ImageFit = 'stretch', view = 0): void {
-    this.#writeUniform(texture.width, texture.height, fit, view);
+  write(
+    texture: GPUTexture,
+    fit: ImageFit = 'stretch',
+    view = 0,
+    part: { readonly width: number; readonly height: number } = texture,
+  ): void {
+    this.#writeUniform(part.width, part.height, fit, view);
     let bindings = this.#bindings.get(texture);
     if (bindings === undefined) {
       bindings = this.#kernel.bind({ image: this.#uniform, picture: texture.createView(), tensor: this.buffer });

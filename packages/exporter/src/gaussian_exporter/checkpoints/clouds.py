@@ -112,8 +112,31 @@ def captured_of(content: object) -> Sequence[Any] | None:
     return content[0] if is_pair else None  # type: ignore[index]
 
 
+# Parameters that only one network has. They turn images into Gaussians: the file is weights, and no Gaussians.
+_NETWORKS = {
+    "encoder.epipolar_transformer.": "pixelSplat",
+    "encoder.depth_predictor.corr_refine_net.": "MVSplat",
+    "network_with_offset.": "Splatter Image",
+    "network_wo_offset.": "Splatter Image",
+    "gs_tokens": "TokenGS",
+}
+
+
+def network_of(content: object) -> str | None:
+    """Which published network a state_dict is of, alone or as an entry of the file."""
+    entries = content if isinstance(content, Mapping) else {}
+    states = [entries, *(value for value in entries.values() if isinstance(value, Mapping))]
+    names = [str(name) for state in states for name in state]
+    found = (network for mark, network in _NETWORKS.items() if any(name.startswith(mark) for name in names))
+    return next(found, None)
+
+
 def unknown(path: Path, content: object) -> ExportError:
     """The error of a file that no known trainer writes."""
+    network = network_of(content)
+    if network is not None:
+        remedy = "load it into its class, and export that: gaussian_exporter.export_module, inputs image(views=2)"
+        return other_family(path, network, "weights of a network that turns images into Gaussians", remedy)
     names = [str(key) for key in content] if isinstance(content, Mapping) else [type(content).__name__]
     return ExportError(
         "checkpoint/other-family",

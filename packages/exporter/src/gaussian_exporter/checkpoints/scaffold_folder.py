@@ -19,6 +19,8 @@ from .unread import refuse_unread
 
 _REQUIRED = {"opacity": "opacity_mlp", "colour": "color_mlp", "covariance": "cov_mlp"}
 _NETWORKS = {**_REQUIRED, "feature_bank": "feature_bank_mlp"}
+# The name in files of Scaffold-GS before 2024.
+_OLD_FEATURE_BANK = "mlp_feature_bank"
 
 
 def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()) -> Scaffold:
@@ -29,6 +31,7 @@ def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()
     settings = settings_of(folder, "level" in vertices.names)
     anchors = read_anchors(vertices)
     levels = read_levels(vertices, settings)
+    code = read_appearance(networks.get("appearance"), appearance)
     model = Scaffold(
         **anchors,
         opacity=networks["opacity"].linears(),
@@ -38,9 +41,9 @@ def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()
         uses_distance=tuple(
             name
             for name, word in (("opacity", "opacity"), ("covariance", "cov"), ("colour", "color"))
-            if settings.get(f"add_{word}_dist")
+            if settings.get(f"add_{word}_dist", _takes_distance(networks[name], anchors["features"], name, code))
         ),
-        appearance=read_appearance(networks.get("appearance"), appearance),
+        appearance=code,
         levels=levels,
     )
     # What INRIA's layout asks for, and anchors do not use.
@@ -48,6 +51,13 @@ def read_scaffold(folder: Path, appearance: int = 0, ignored: Sequence[str] = ()
     for weights in networks.values():
         weights.refuse_unread(ignored)
     return model
+
+
+def _takes_distance(network: Weights, features: Floats, name: str, appearance: Floats | None) -> bool:
+    """Whether a network of Scaffold-GS has an input more than features, direction and the code of an appearance. The
+    first versions always have it, and no setting for it."""
+    extra = len(appearance) if name == "colour" and appearance is not None else 0
+    return bool(network.linears()[0].inputs == features.shape[1] + 4 + extra)
 
 
 def settings_of(folder: Path, has_levels: bool) -> dict[str, object]:
@@ -65,6 +75,8 @@ def read_networks(folder: Path, ignored: Sequence[str] = ()) -> dict[str, Weight
         weights = read_weights(united)
         names = {**_NETWORKS, "appearance": "appearance"}
         roots = {name.split(".")[0] for name in weights.tensors}
+        if _OLD_FEATURE_BANK in roots:
+            names["feature_bank"] = _OLD_FEATURE_BANK
         refuse_unread(united, "networks", sorted(roots), names.values(), ignored=ignored)
         found = {role: weights.under(name) for role, name in names.items()}
         return {role: weights for role, weights in found.items() if weights.tensors or role in _REQUIRED}

@@ -39,8 +39,9 @@ class Avatar:
 
     positions (N,3), scales (N,3) standard deviations, rotations (N,4) w x y z, opacities (N,1) 0..1, sh (N,(d+1)^2,3);
     weights (N,J), rows sum to 1; joints (J,3) at rest. Blend shapes, all optional: shape_directions (N,3,B) and
-    joint_directions (J,3,B) move Gaussians and joints by the coefficients of `shape`, expression_directions (N,3,E) by
-    those of `expression`, pose_directions (N,3,9(J-1)) by the entries of every non-root rotation less the identity.
+    joint_directions (J,3,B) move Gaussians and joints by the coefficients of `shape`, expression_directions (N,3,E) and
+    expression_joint_directions (J,3,E) by those of `expression`, pose_directions (N,3,9(J-1)) by the entries of every
+    non-root rotation less the identity.
     """
 
     positions: Floats
@@ -55,6 +56,7 @@ class Avatar:
     shape_directions: Floats | None = None
     joint_directions: Floats | None = None
     expression_directions: Floats | None = None
+    expression_joint_directions: Floats | None = None
     pose_directions: Floats | None = None
 
 
@@ -133,9 +135,10 @@ def blended(avatar: Avatar, graph: Graph, products: Tensor, inputs: list[Input])
         count = avatar.expression_directions.shape[2]
         # The role `shape` is there once only, so that a page knows which coefficients are the body's.
         inputs.append(control("expression", 0.0, -3.0, 3.0))
-        points = along(
-            row_of(graph, "expression", count), avatar.expression_directions, points, "expression_directions"
-        )
+        face = row_of(graph, "expression", count)
+        points = along(face, avatar.expression_directions, points, "expression_directions")
+        if avatar.expression_joint_directions is not None:
+            joints = along(face, avatar.expression_joint_directions, joints, "expression_joint_directions")
     if avatar.pose_directions is not None:
         count = len(avatar.parents)
         bends = rotation_entries(products.part(1, count, -2)).reshape(*graph.lead, 1, 9 * (count - 1))

@@ -11,6 +11,7 @@ from onnx import TensorProto, helper, numpy_helper
 from ..arrays import AnyArray
 from ..graph import ALIASES
 from ..placement import RULES, gpu_findings
+from .kernels import use_kernels
 from .layouts import Layout
 from .roles import Role
 
@@ -31,6 +32,7 @@ def finish_graph(
             _name_output(graph, value, wanted)
     for index, value in enumerate(graph.output):
         _declare(value, [tensors[index] for tensors in expected], layout)
+    use_kernels(model)
     _turn_vectors(model)
     _write_by_kernels(model, inputs)
     onnx.checker.check_model(model)

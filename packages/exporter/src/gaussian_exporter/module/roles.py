@@ -187,6 +187,15 @@ def image(width: int, height: int, views: int = 1) -> Role:
     return Role({"role": "image"}, sizes, images, np.zeros(sizes, np.float32))
 
 
+def depth(width: int, height: int) -> Role:
+    """[1,1,H,W], of a post-processor: depth of the frame along the axis of the camera, in world units, at which half of
+    the light is gone; 0 where more than half passes."""
+    rng, sizes = np.random.default_rng(1), (1, 1, height, width)
+    surface = rng.uniform(0.5, 20, sizes).astype(np.float32)
+    holes = np.where(rng.random(sizes) < 0.2, 0, surface).astype(np.float32)
+    return Role({"role": "depth"}, sizes, [surface, holes], np.zeros(sizes, np.float32))
+
+
 def frame() -> Role:
     """[1] int32: index of a frame."""
     return Role({"role": "frame"}, (1,), [np.zeros(1, np.int32), np.ones(1, np.int32)])

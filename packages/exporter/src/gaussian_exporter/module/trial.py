@@ -19,7 +19,7 @@ Values = Mapping[str, AnyArray]
 
 def wrapped_module(module: Any, inputs: Mapping[str, Role], layout: Layout, batched: bool, torch: Any) -> Any:
     """The module with outputs as the contract has them, and a batch before its inputs where it takes one."""
-    stays = [role.binding["role"] in ("image", "state") or not batched for role in inputs.values()]
+    stays = [role.binding["role"] in ("image", "depth", "state") or not batched for role in inputs.values()]
 
     class Named(torch.nn.Module):  # type: ignore[misc]
         def __init__(self) -> None:
