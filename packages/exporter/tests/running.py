@@ -25,7 +25,11 @@ def run(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = None) -> dic
         name: np.asarray(value, np.int32 if name in whole else np.float32) for name, value in (feeds or {}).items()
     }
     names = [output.name for output in session.get_outputs()]
-    written = dict(zip(names, session.run(None, given), strict=True))
+    return activated(model, dict(zip(names, session.run(None, given), strict=True)))
+
+
+def activated(model: onnx.ModelProto, written: dict[str, AnyArray]) -> dict[str, AnyArray]:
+    """Scales and opacities after the activations that the model declares."""
     contract: Any = json.loads({prop.key: prop.value for prop in model.metadata_props}.get(METADATA_KEY, "{}"))
     outputs = contract.get("outputs", {})
     if outputs.get("scaleActivation") == "log":
