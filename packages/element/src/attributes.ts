@@ -1,6 +1,7 @@
 /**
- * The attributes of `<gaussian-splat>`, each in one place: its property's type, its declaration for Lit, its grammar, its default, an example, and what the reference says of it. The manifest
- * for editors and docs/guide/attributes.md are made from this file (`scripts/attributes.mjs`). Kinds are called without options where their type says all.
+ * The attributes of `<gaussian-splat>`, each defined once: its property's type, its declaration for Lit, its grammar,
+ * its default, an example, and its documentation. The manifest for editors and docs/guide/attributes.md are generated
+ * from this file (`scripts/attributes.mjs`). Grammars without parameters are referenced by name.
  */
 import type { ShDegree, SplatFilter } from '@gaussian-splat/core';
 import type { Quality } from '@gaussian-splat/renderer';
@@ -20,55 +21,58 @@ import type { CameraSettings } from './camera/settings.js';
 import type { Numbers } from './live/values.js';
 import type { SpokenStrings } from './words.js';
 
-/** As much of a wait, ms, as timers can: whatever is longer, `Infinity` too, they take for none at all. */
+/** Limits a delay in ms to the maximum of timers, which treat longer ones, even `Infinity`, as 0. */
 export const timerMs = (wait: number): number => Math.min(wait, 2 ** 31 - 1);
 
-/** When loading starts: once the element is in sight, or as soon as it is in the page. */
+/** Start of loading: when the element enters the viewport, or as soon as it is connected. */
 export type Loading = 'lazy' | 'eager';
 
-/** One-finger moves that stay the page's. */
+/** One-finger gestures that are left to the page. */
 export type TouchAction = 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation';
 
 /**
- * Error that levels of detail may cause: `auto` none at rest, and while moving what the GPU needs; `off` none; or, at rest and while moving, as many pixels as the
- * number says.
+ * Error that levels of detail may cause: `auto` none at rest, and while moving as much as the GPU requires; `off` none;
+ * or a number of pixels, at rest and while moving.
  */
 export type DetailChoice = 'auto' | 'off' | number;
 
-/** Accuracy of frames: `auto` is `default` at rest; while moving it goes lower if the GPU needs it. */
+/** Accuracy of frames: `auto` is `default` at rest, and lower while moving if the GPU requires it. */
 export type QualityChoice = 'auto' | Quality;
 
-/** The low-pass filter that a scene was trained with: `auto` is what its file says, or else `classic`. */
+/** The low-pass filter of a scene's training: `auto` is that of its file, or else `classic`. */
 export type FilterChoice = 'auto' | SplatFilter;
-/** What draws: `auto` is WebGPU where the browser has it, else WebGL 2. */
+/** Rendering backend: `auto` is WebGPU if the browser supports it, else WebGL 2. */
 export type RendererChoice = 'auto' | 'webgpu' | 'webgl';
-/** What splats are ordered by. `auto`: what the file says, else their centres. */
+/** Sort order of splats. `auto`: that of the file, else their centers. */
 export type OrderChoice = 'auto' | 'center' | 'pixel' | 'distance';
-/** When the wheel zooms, and when it is the page's. */
+/** Conditions under which the wheel zooms instead of scrolling the page. */
 export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 
-/** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
+/** Dismissal of the poster: as soon as the scene can be drawn, or by the page. */
 export type Reveal = 'auto' | 'manual';
 
 /** Whether visitors are shown how to move the camera. */
 export type InteractionPrompt = 'auto' | 'none';
 
-/** `wiggle` turns the camera to and fro with the prompt; `basic` stands still. */
+/** `wiggle` swings the camera with the prompt; `basic` keeps it still. */
 export type InteractionPromptStyle = 'wiggle' | 'basic';
 
-/** What the camera does under a person's hands: turn around its target, fly, or walk on the floor. */
+/** Camera motion under a visitor's control: orbit around its target, fly, or walk on the floor. */
 export type Navigation = 'orbit' | 'fly' | 'walk';
 
-/** One attribute, as the tables of elements list them. Only types know `P`, of the property, and `V`, of what is read of it: never where the element takes the property as it is. */
+/**
+ * One attribute, as in the tables of elements. The types `P` of the property and `V` of the parsed value exist only at
+ * compile time; `V` is never if the element uses the property directly.
+ */
 export interface Attribute<P, V = never> {
   readonly lit: PropertyDeclaration;
   readonly grammar?: AttributeGrammar<V>;
   readonly property?: P;
 }
 
-/** Taken as it is written. */
+/** Used as written. */
 export const text = <P = string | null>(): Attribute<P> => ({ lit: {} });
-/** On wherever it is written, but for `"false"`: what frameworks write that take it for an attribute with a value. */
+/** True if present, except for `"false"`, because some frameworks write it as an attribute with a value. */
 export const flag = (): Attribute<boolean> => ({
   lit: {
     type: Boolean,
@@ -79,7 +83,7 @@ export const read = <V, P = string | null>(grammar: AttributeGrammar<V>): Attrib
 const number = <V>(grammar: AttributeGrammar<V>): Attribute<number | string | null, V> => ({ lit: {}, grammar });
 /** The first is the default. */
 const keyword = <V extends string>(words: readonly V[]): Attribute<V | null, V> => read(keywordGrammar(words));
-/** `''` is what the bare attribute gives. */
+/** `''` is the value of the bare attribute. */
 export const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> =>
   read(keywordGrammar(words));
 
@@ -130,7 +134,7 @@ export const ATTRIBUTES = {
    */
   poster: text(),
   /**
-   * `lazy` waits until the element comes into view. `eager` loads at once.
+   * `lazy` waits until the element enters the viewport. `eager` loads at once.
    * @default `lazy`
    * @example loading="eager"
    */
@@ -155,27 +159,30 @@ export const ATTRIBUTES = {
    */
   cameraControls: flag(),
   /**
-   * Theta, phi and radius. Angles have `deg` or `rad`. The radius has `m`, `cm`, `mm`, or `%` of the radius that frames the scene: all of a subject that
-   * stands alone, else the central 90 % of the splats. Each may be `auto`, and the end may be left out. The syntax is that of `<model-viewer>`, without
-   * `calc()` and `env()`. Setting it moves the camera, also to the same value. `getCameraOrbit()` says where the camera is.
+   * Theta, phi and radius. Angles have `deg` or `rad`. The radius has `m`, `cm`, `mm`, or `%` of the radius that frames
+   * the scene: a single subject as a whole, else the central 90 % of the splats. Each may be `auto`, and trailing
+   * values may be omitted. The syntax is that of `<model-viewer>`, without `calc()` and `env()`. Setting it moves the
+   * camera, also to the same value. `getCameraOrbit()` returns the current position.
    * @default `0deg 75deg auto`
    * @example camera-orbit="30deg 75deg 120%"
    */
   cameraOrbit: read(orbitGrammar('0deg 75deg auto')),
   /**
-   * The point that the camera looks at: x y z in metres of viewer space (y up, right-handed). `auto` is the middle of the scene.
+   * The point that the camera looks at: x y z in meters of viewer space (y up, right-handed). `auto` is the center of
+   * the scene.
    * @default `auto`
    * @example camera-target="0m 1.2m 0m"
    */
   cameraTarget: read(targetGrammar),
   /**
-   * Least `camera-target`. Without this and `max-camera-target`, visitors pan within the radius that frames the scene.
+   * Lower limit of `camera-target`. Without this and `max-camera-target`, visitors pan within the radius that frames
+   * the scene.
    * @default `auto`: no limit
    * @example min-camera-target="-2m 0m -2m"
    */
   minCameraTarget: read(targetGrammar),
   /**
-   * Greatest `camera-target`.
+   * Upper limit of `camera-target`.
    * @default `auto`: no limit
    * @example max-camera-target="2m 3m 2m"
    */
@@ -193,25 +200,25 @@ export const ATTRIBUTES = {
    */
   views: text<object | string | null>(),
   /**
-   * Least `camera-orbit`.
+   * Lower limit of `camera-orbit`.
    * @default `auto`: phi 22.5deg, radius 2 %
    * @example min-camera-orbit="auto 45deg 50%"
    */
   minCameraOrbit: read(orbitGrammar('auto')),
   /**
-   * Greatest `camera-orbit`.
+   * Upper limit of `camera-orbit`.
    * @default `auto`: phi 157.5deg, radius 500 %
    * @example max-camera-orbit="auto 90deg 200%"
    */
   maxCameraOrbit: read(orbitGrammar('auto')),
   /**
-   * Least `field-of-view`.
+   * Lower limit of `field-of-view`.
    * @default `auto` (1deg)
    * @example min-field-of-view="15deg"
    */
   minFieldOfView: read(fieldOfViewGrammar),
   /**
-   * Greatest `field-of-view`.
+   * Upper limit of `field-of-view`.
    * @default `auto` (160deg)
    * @example max-field-of-view="60deg"
    */
@@ -229,8 +236,8 @@ export const ATTRIBUTES = {
    */
   touchAction: keyword<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']),
   /**
-   * When the wheel zooms. `auto`: with Ctrl, while the scene has the focus, or where the page does not scroll. `always`; `ctrl`: with Ctrl only; `none`.
-   * At the limit of the zoom the page scrolls. Two fingers zoom in any case.
+   * When the wheel zooms. `auto`: with Ctrl, while the scene has the focus, or if the page does not scroll. `always`;
+   * `ctrl`: with Ctrl only; `none`. At the limit of the zoom the page scrolls. Two fingers zoom in any case.
    * @default `auto`
    * @example zoom="always"
    */
@@ -241,7 +248,7 @@ export const ATTRIBUTES = {
    */
   disableZoom: flag(),
   /**
-   * Keeps the target of the camera where it is.
+   * Keeps visitors from panning, so that the camera target does not move.
    * @example disable-pan
    */
   disablePan: flag(),
@@ -276,12 +283,13 @@ export const ATTRIBUTES = {
    */
   unit: text(),
   /**
-   * Offers VR where the browser has a headset: a button, which the slot `vr-button` replaces, and `activateVR()`.
+   * Offers VR if the browser has a headset: a button, which the slot `vr-button` replaces, and `activateVR()`.
    * @example vr
    */
   vr: flag(),
   /**
-   * Offers AR where the browser has it: a button, which the slot `ar-button` replaces, and `activateAR()`. The subject of the scene stands on the floor of the room.
+   * Offers AR if the browser supports it: a button, which the slot `ar-button` replaces, and `activateAR()`. The
+   * subject of the scene stands on the real floor.
    * @example ar
    */
   ar: flag(),
@@ -292,7 +300,7 @@ export const ATTRIBUTES = {
    */
   arModes: text(),
   /**
-   * Where an object of AR stands: on the `floor` or on a `wall`.
+   * Placement of an object in AR: on the `floor` or on a `wall`.
    * @default `floor`
    * @example ar-placement="wall"
    */
@@ -310,7 +318,8 @@ export const ATTRIBUTES = {
    */
   iosSrc: text(),
   /**
-   * How dark the shadow is on the ground under what is shown, 0 to 1. It is made of the splats and meshes themselves, once, and again when they change.
+   * Darkness of the shadow on the ground under the scene, 0 to 1. It is computed from the splats and meshes once, and
+   * again when they change.
    * @default `0`: none. AR has one of `1`
    * @example shadow-intensity="1"
    */
@@ -345,13 +354,13 @@ export const ATTRIBUTES = {
    */
   rotationPerSecond: read(angleGrammar('5.625deg')),
   /**
-   * `auto` shows that the scene can be turned to visitors who have not done so. `none` does not.
+   * `auto` shows visitors who have not touched the scene that it can be rotated. `none` does not.
    * @default `auto`
    * @example interaction-prompt="none"
    */
   interactionPrompt: keyword<InteractionPrompt>(['auto', 'none']),
   /**
-   * `basic` stands still. `wiggle` moves the camera to and fro once, which draws frames.
+   * `basic` is a still image. `wiggle` swings the camera once, which draws frames.
    * @default `basic`
    * @example interaction-prompt-style="wiggle"
    */
@@ -373,18 +382,19 @@ export const ATTRIBUTES = {
    */
   a11y: text<SpokenStrings | string | null>(),
   /**
-   * What points up in the axes of the file: `x`, `-x`, `y`, `-y` (as trainers write), `z`, `-z`, or a direction such as `0.1 -1 0.2` for a tilted capture.
-   * The playground finds it from three points of the floor. The contract of a generator may name another default.
+   * Up direction in the axes of the file: `x`, `-x`, `y`, `-y` (as in training), `z`, `-z`, or a vector such as `0.1 -1
+   * 0.2` for a tilted capture. The playground finds it from three points of the floor. The contract of a generator may
+   * declare another default.
    * @default `-y`
    * @example up="y"
    */
   up: read(upGrammar),
   /**
-   * Most drawn pixels for each CSS pixel.
+   * Upper limit of device pixels rendered per CSS pixel.
    * @default no limit
    * @example max-pixel-ratio="1"
    */
-  // Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
+  // Far below any ratio in use, so that 0 is rejected but thumbnails of pixels are not.
   maxPixelRatio: number(numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0')),
   /**
    * Milliseconds of GPU time for a frame while moving, with `quality="auto"`: for pages that draw other things on the GPU. By default the elements that
@@ -394,45 +404,47 @@ export const ATTRIBUTES = {
    */
   frameBudget: number(numberGrammar(Infinity, 0.01, 'milliseconds, 0.01 or more')),
   /**
-   * Accuracy against speed, as PSNR to the reference image: `reference` (75 dB), `default` (59 dB, no difference on a display), `balanced` (42 dB), `fast`
-   * (36 dB). `auto` is `default` at rest; while moving it goes lower if the GPU needs it. `reference` loads a scene again if its colours were rounded to 8
-   * bits.
+   * Accuracy against speed, as PSNR to the reference image: `reference` (75 dB), `default` (59 dB, no difference on a
+   * display), `balanced` (42 dB), `fast` (36 dB). `auto` is `default` at rest; while moving it goes lower if the GPU
+   * needs it. `reference` loads a scene again if its colors were rounded to 8 bits.
    * @default `auto`
    * @example quality="balanced"
    */
   quality: keyword<QualityChoice>(['auto', 'default', 'reference', 'balanced', 'fast']),
   /**
-   * What draws: `auto` is WebGPU and, in browsers without it, WebGL 2, which shows only scene files; `webgpu` and `webgl` are that one or an error.
+   * Rendering backend. `auto` uses WebGPU, or WebGL 2 (scene files only) in browsers without it; `webgpu` and `webgl`
+   * force one and fail otherwise.
    * @default `auto`
    * @example renderer="webgl"
    */
   renderer: keyword<RendererChoice>(['auto', 'webgpu', 'webgl']),
   /**
-   * Highest degree of spherical harmonics that is evaluated, 0 to 3. With 0 colours do not depend on the view.
+   * Maximum degree of spherical harmonics, 0 to 3. With 0 colors do not depend on the view.
    * @default `3`
    * @example max-sh-degree="0"
    */
   maxShDegree: number(map(keywordGrammar(['3', '2', '1', '0']), (degree) => Number(degree) as ShDegree)),
   /**
-   * The low-pass filter that the scene was trained with, for files that cannot say it: `classic` (0.3 px²), `antialiased` (0.3 px² with compensation: the
-   * options of that name of gsplat and INRIA), `mip` (0.1 px² with compensation: Mip-Splatting, mip mode of Brush). With a wrong filter distant splats
-   * look too thin or too thick.
-   * @default `auto`: what the file says, else `classic`
+   * The low-pass filter that the scene was trained with, for files that do not contain it: `classic` (0.3 px²),
+   * `antialiased` (0.3 px² with compensation: the options of that name of gsplat and INRIA), `mip` (0.1 px² with
+   * compensation: Mip-Splatting, mip mode of Brush). With a wrong filter distant splats look too thin or too thick.
+   * @default `auto`: according to the file, else `classic`
    * @example filter="antialiased"
    */
   filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
   /**
-   * What splats are ordered by. `center`: the depth of their centers, as most scenes are trained. `distance`: their distance from the eye, which turning the camera does
-   * not change, so that nothing pops, but which differs from how scenes are trained. `pixel`: at each pixel the point of its ray where a splat is
-   * densest. This does not pop when the camera turns, fits scenes that StopThePop trained, and takes the GPU longer.
-   * @default `auto`: what the file says, else `center`
+   * Sort key of the splats. `center`: the depth of their centers, as in the training of most scenes. `distance`: their
+   * distance from the eye, which does not change when the camera turns, so that nothing pops, but which differs from
+   * training. `pixel`: at each pixel the point of its ray with the splat's maximum density. This does not pop when the
+   * camera turns, fits scenes that StopThePop trained, and takes more GPU time.
+   * @default `auto`: according to the file, else `center`
    * @example order="pixel"
    */
   order: keyword<OrderChoice>(['auto', 'center', 'pixel', 'distance']),
   /**
-   * Levels of detail. `auto` builds them where the GPU is too slow for the scene, and draws them while moving only. `off` builds none. Pixels such as
-   * `1px` allow this error in every frame. Streamed scenes (`detail.json`, `lod-meta.json`) have levels: `auto` is `1px` for them, and `off` loads a
-   * `lod-meta.json` at once and whole.
+   * Levels of detail. `auto` builds them if the GPU is too slow for the scene, and draws them only during motion. `off`
+   * builds none. Pixels such as `1px` allow this error in every frame. Streamed scenes (`detail.json`, `lod-meta.json`)
+   * contain levels: `auto` is `1px` for them, and `off` loads a `lod-meta.json` completely at once.
    * @default `auto`
    * @example detail="2px"
    */
@@ -460,12 +472,13 @@ export const ATTRIBUTES = {
    */
   postprocess: text(),
   /**
-   * Shows controls for what the generator or post-processor takes: sliders, joints, images, the time. Style them by their parts.
+   * Shows controls for the inputs of the generator or post-processor: sliders, joints, images, the time. Style them by
+   * their parts.
    * @example controls-panel
    */
   controlsPanel: flag(),
   /**
-   * Seconds: each change sets the time of the scene. `currentTime` says where it is.
+   * Playback position in seconds: each change seeks. `currentTime` returns the current position.
    * @example time="1.5"
    */
   time: text<number | string | null>(),
@@ -493,13 +506,13 @@ export type AttributeProperties = {
   -readonly [K in keyof Table]: Table[K] extends Attribute<infer P, unknown> ? P : never;
 };
 
-/** An attribute's raw value: text, or what a property was given instead. */
+/** An attribute's raw value: text, or the value of the property. */
 export type Raw = string | number | null | undefined;
 
 /** All properties, as the page has set them. */
 export type RawAttributes = { readonly [K in keyof Table]: unknown };
 
-/** All of them, read: by their grammars, or as they were given. */
+/** The parsed values: by their grammars, or the raw ones. */
 export type Attributes = {
   readonly [K in keyof Table]: Table[K] extends Attribute<infer P, infer V> ? ([V] extends [never] ? P : V) : never;
 } & { readonly camera: CameraSettings };
@@ -507,20 +520,20 @@ export type Attributes = {
 const entries = Object.entries(ATTRIBUTES) as [keyof Table, Attribute<unknown, unknown>][];
 const attributeOf = (property: string): string => property.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`);
 
-/** Fetch's word for it. */
+/** Converts to Fetch's option. */
 export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCredentials =>
   crossorigin === 'use-credentials' ? 'include' : 'same-origin';
 
-/** What Lit is told of a table. */
+/** Property declarations of a table for Lit. */
 export const declarations = (
   table: Readonly<Record<string, Attribute<unknown, unknown>>> = ATTRIBUTES,
 ): PropertyDeclarations =>
   Object.fromEntries(Object.entries(table).map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
 
-/** The properties that are on or off. */
+/** The boolean properties. */
 export const flags = entries.filter(([, { lit }]) => lit.type === Boolean).map(([name]) => name);
 
-/** Reads all attributes; `warn` gets one sentence for each malformed one. */
+/** Parses all attributes; `warn` is called with one sentence for each malformed one. */
 export function readAttributes(raw: RawAttributes, warn: (sentence: string) => void): Attributes {
   const values = Object.fromEntries(
     entries.map(([name, { grammar }]) => [

@@ -13,32 +13,32 @@ import type { MotionController, MotionHost } from './controllers/motion-controll
 import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/motion.js';
 import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
 
-/** What the behaviours ask of their element. */
+/** Interface of the element for behaviors. */
 export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
   readonly attributes: Attributes;
   readonly camera: CameraController;
   readonly input: InputOptions;
   readonly strings: SpokenStrings;
   readonly surface: HTMLElement | null;
-  /** What walks, once it is loaded. */
+  /** The walk controller, once it is loaded. */
   readonly walk: { readonly value: { readonly isRefused: boolean; ahead(meters: number): void } | undefined };
   requestFrame(): void;
   warn(sentence: string): void;
 }
 
-/** All that happens around the camera besides a person's own hands: turning, prompting, flying, speaking. */
+/** Camera behaviors besides direct input: auto-rotation, prompt, flying, announcements. */
 export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, AnnouncerHost, MotionHost {
-  /** Comes with what lets people move the camera. */
+  /** Created with the camera controls. */
   prompt: PromptController | undefined;
   readonly #host: BehaviourHost;
   readonly #element: ReactiveControllerHost;
   readonly #movers: Mover[] = [];
 
-  // Few pages need these.
+  // Loaded on demand, because few pages need these.
 
-  /** What speaks of the view. */
+  /** Announces the view to screen readers. */
   readonly announcer: Lazy<AnnouncerController>;
-  /** The visitor's switch for what moves by itself. */
+  /** The visitor's switch for automatic motion. */
   readonly motion: Lazy<MotionController>;
   readonly #autoRotate = new Lazy('the code that turns the camera', async () => {
     const { AutoRotateController } = await import('./controllers/auto-rotate-controller.js');
@@ -74,7 +74,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
         if (this.attributes.autoRotate || this.player) this.motion.want(this.#warnOf);
       },
       hostConnected: () => {
-        // From the picture to the button inside counts, too.
+        // Also when the focus moves from the frame to the button inside.
         element.shadowRoot?.addEventListener('focusout', this.#onBlur);
         motion = reducedMotion();
         motion.addEventListener('change', onMotion);
@@ -115,7 +115,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return viewName(theta, phi);
   }
 
-  /** In flight there is no side from which the scene is seen. */
+  /** While flying, the view has no named side. */
   get isFocused(): boolean {
     return !this.#flies && (this.surface?.matches(':focus') ?? false);
   }
@@ -146,12 +146,12 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     this.camera.moveBy(right, up, forward);
   }
 
-  /** The camera moves to and fro with the prompt: only for people who have not asked for less motion. */
+  /** The prompt swings the camera only for visitors without reduced motion. */
   get promptWiggles(): boolean {
     return this.attributes.interactionPromptStyle === 'wiggle' && !prefersReducedMotion();
   }
 
-  /** The camera stays on the floor; until one is found it stands still, and without one it flies. */
+  /** Whether the camera stays on the floor; until one is found it does not move, and without one it flies. */
   get #walks(): boolean {
     return this.attributes.navigation === 'walk' && !this.#host.walk.value?.isRefused;
   }
@@ -164,7 +164,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     this.prompt = this.#added(prompt);
   }
 
-  /** Something else that moves the camera by itself. */
+  /** Adds another automatic motion of the camera. */
   add(mover: Mover): void {
     this.#movers.push(mover);
   }
@@ -177,17 +177,17 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
 
   readonly #warnOf = ({ message }: Error): void => this.#host.warn(message);
 
-  /** What turns by itself waits once more. */
+  /** Restarts the delay of auto-rotation. */
   rest(): void {
     this.#autoRotate.value?.rest();
   }
 
-  /** Moves what moves by itself on to a frame. */
+  /** Advances automatic motions to a frame. */
   advance(now: number): void {
     for (const mover of this.#movers) if (mover.advance(now)) this.requestFrame();
   }
 
-  /** A person's gesture or key. @returns false where it moves nothing: at the limit of the zoom */
+  /** Applies a visitor's gesture or key. @returns False if it has no effect, at the limit of the zoom. */
   act(action: CameraAction): boolean {
     const camera = this.camera;
     const { isTouched } = camera;
@@ -199,18 +199,18 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     } else if (this.#flies) this.#flyWith(action);
     else if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
     else moves = camera.zoomBy(action.factor);
-    // The button that brings the camera back comes and goes with this.
+    // The reset button depends on this.
     if (camera.isTouched !== isTouched) this.#element.requestUpdate();
     return moves;
   }
 
-  /** A person picks another point to turn around: viewer space. */
+  /** Sets the orbit target that a visitor picks, in viewer space. */
   aimAt(point: Vector3): void {
     this.#touched();
     this.camera.aimAt(point);
   }
 
-  /** In flight the scene follows the pointer: a drag across the picture turns the view by the picture's own angle. */
+  /** In flight the scene follows the pointer: a drag across the frame rotates the view by its field of view. */
   #flyWith(action: Extract<CameraAction, { type: 'orbit' | 'zoom' }>): void {
     const camera = this.camera;
     if (action.type === 'zoom') {
@@ -230,8 +230,8 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   readonly #onBlur = (): void => this.rest();
 }
 
-/** What a zoom by the factor e is worth for a walker, meters. */
+/** Distance that a zoom by the factor e moves a walker, meters. */
 const WHEEL_METERS = 2;
 
-/** True while a person has come to the picture by keyboard, and nothing may move under their hands. */
+/** Whether the frame has keyboard focus, during which nothing may move automatically. */
 const hasKeyboard = (surface: HTMLElement | null): boolean => surface?.matches(':focus-visible') ?? false;

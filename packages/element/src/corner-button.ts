@@ -1,4 +1,4 @@
-/** A button in a corner of the image. Loaded with what needs one. */
+/** A button in a corner of the frame. Loaded on demand. */
 import { css, html, nothing, type TemplateResult } from 'lit';
 import { languageOf, type SpokenStrings } from './words.js';
 
@@ -17,7 +17,9 @@ export const CORNER_STYLES = css`
   }
 `;
 
-/** Seen while the pointer is over the scene or the keyboard in it, and always where nothing hovers. */
+/**
+ * Visible while the pointer hovers over the scene or the keyboard focus is in it, and always on devices without hover.
+ */
 export const cornerButton = (
   part: string,
   label: string,

@@ -18,7 +18,7 @@ import { readSpokenStrings, type SpokenStrings } from './words.js';
 import type { SoundProperties } from './live/sound-properties.js';
 import type { ImmersiveMethods } from './xr/methods.js';
 
-/** The properties that move the camera, and what each sets. */
+/** The properties that move the camera, and the setting of each. */
 const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
   ['cameraOrbit', 'orbit'],
   ['cameraTarget', 'target'],
@@ -40,109 +40,112 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot progress-bar - Shown while the scene loads.
  * @slot interaction-prompt - Shown to visitors who have not touched the scene yet.
  * @slot fallback - Shown if neither WebGPU nor WebGL 2 can draw the scene.
- * @slot error - Shown if the scene cannot be.
+ * @slot error - Shown if the scene cannot be displayed.
  * @slot view - Buttons of the page for its views, each with `data-orbit`.
- * @slot sound - An `<audio>` or `<video>` that is heard with a scene that moves; its captions are shown.
- * @slot hotspot-* - A label of the page at the point of the scene that its `data-position` names.
+ * @slot sound - An `<audio>` or `<video>` element that plays along with a moving scene; its captions are shown.
+ * @slot hotspot-* - A label of the page at the scene point in its `data-position`.
  * @csspart canvas - The frame.
  * @csspart poster - The image of the `poster` attribute.
  * @csspart poster-button - The button around it with `reveal="manual"`.
- * @csspart poster-cue - The sign in the middle of that button.
+ * @csspart poster-cue - The play symbol in the center of that button.
  * @csspart prompt - The default interaction prompt.
- * @csspart reset-button - Brings the camera back: shown to visitors who have moved it with their fingers.
+ * @csspart reset-button - Resets the camera: shown to visitors who have moved it by touch.
  * @csspart views - The bar of the views.
- * @csspart view-name - The name of the present view in it.
- * @csspart previous-view - Its button for the view before.
- * @csspart next-view - Its button for the next view.
- * @csspart pause-button - The visitor's button for what `auto-rotate` and `autoplay` move.
- * @csspart progress-track - The progress bar's ground.
+ * @csspart view-name - The name of the current view in that bar.
+ * @csspart previous-view - The button of that bar for the previous view.
+ * @csspart next-view - The button of that bar for the next view.
+ * @csspart pause-button - The button that pauses `auto-rotate` and `autoplay`.
+ * @csspart progress-track - The background of the progress bar.
  * @csspart progress-bar - The progress bar.
  * @csspart controls-panel - The panel of the attribute `controls-panel`.
- * @csspart controls-scene - the group of controls of a `<splat-scene>`, a `fieldset`
+ * @csspart controls-scene - The group of controls of a `<splat-scene>`, a `fieldset`.
  * @csspart control - A control in it, with its label.
- * @csspart control-label - The label.
- * @csspart control-input - The slider, field or button.
+ * @csspart control-label - The label of a control.
+ * @csspart control-input - The slider, field or button of a control.
  * @csspart control-value - The number beside a slider.
- * @csspart captions - Lines of the captions of the sound.
+ * @csspart captions - Lines of the sound's captions.
  * @csspart fallback - The default text if neither WebGPU nor WebGL 2 can draw the scene.
  * @csspart error - The default text after an error.
  * @cssproperty [--poster-fit=cover] - `object-fit` of the poster.
- * @cssproperty [--poster-transition=0.3s] - How long the poster fades.
- * @cssproperty --progress-bar-color - Colour of the progress bar.
- * @cssproperty --progress-track-color - Colour behind it.
- * @cssproperty [--progress-bar-height=4px] - Its height.
+ * @cssproperty [--poster-transition=0.3s] - Duration of the poster's fade.
+ * @cssproperty --progress-bar-color - Color of the progress bar.
+ * @cssproperty --progress-track-color - Background color of the progress bar.
+ * @cssproperty [--progress-bar-height=4px] - Height of the progress bar.
  * @cssproperty [--interaction-prompt-display=flex] - `none` hides the interaction prompt.
- * @cssproperty --interaction-prompt-background - Ground of the default prompt.
- * @cssproperty --interaction-prompt-color - Its colour.
- * @cssproperty [--pause-button-display=block] - `none` takes the pause button away: for pages that bring a control of their own.
- * @cssproperty [--reset-button-display=block] - `none` takes the reset button away.
- * @cssproperty [--views-display=flex] - `none` takes the bar of the views away.
+ * @cssproperty --interaction-prompt-background - Background of the default prompt.
+ * @cssproperty --interaction-prompt-color - Text color of the default prompt.
+ * @cssproperty [--pause-button-display=block] - `none` hides the pause button, for pages with a control of their own.
+ * @cssproperty [--reset-button-display=block] - `none` hides the reset button.
+ * @cssproperty [--views-display=flex] - `none` hides the bar of the views.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
- * @cssproperty [--max-hotspot-opacity=1] - Opacity of the others.
- * @cssproperty --captions-background - Ground of captions.
- * @cssproperty --captions-color - Their color.
- * @cssproperty --captions-font - Their font.
- * @cssproperty --message-background - Ground of the default texts.
- * @cssproperty --message-color - Their colour.
- * @cssproperty --message-font - Their font.
- * @cssstate loading - Bytes are on their way.
+ * @cssproperty [--max-hotspot-opacity=1] - Opacity of visible hotspots.
+ * @cssproperty --captions-background - Background of captions.
+ * @cssproperty --captions-color - Text color of captions.
+ * @cssproperty --captions-font - Font of captions.
+ * @cssproperty --message-background - Background of the default texts.
+ * @cssproperty --message-color - Text color of the default texts.
+ * @cssproperty --message-font - Font of the default texts.
+ * @cssstate loading - The scene is loading.
  * @cssstate preview - A part of the scene is visible while the rest loads.
  * @cssstate ready - The scene is shown.
- * @cssstate playing - Its time runs.
- * @cssstate error - It cannot be shown.
+ * @cssstate playing - The animation is playing.
+ * @cssstate error - The scene cannot be displayed.
  * @cssstate unsupported - Neither WebGPU nor WebGL 2 can draw the scene in this browser.
- * @fires {CustomEvent<LoadDetail>} load - The first frame is drawn.
- * @fires {ProgressEvent} progress - Bytes have arrived.
- * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is visible while the rest loads.
- * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
- * @fires {CustomEvent<GaussianSplatError>} shader-error - The function of `splatShader` does not compile; `detail` names the line. The scene is drawn without it.
- * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
- * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
+ * @fires {CustomEvent<LoadDetail>} load - Fired when the first frame is drawn.
+ * @fires {ProgressEvent} progress - Fired when bytes have arrived.
+ * @fires {CustomEvent<PreviewDetail>} preview - Fired when a part of the scene becomes visible while the rest loads.
+ * @fires {CustomEvent<ElementError>} error - Fired when the scene cannot be displayed; `detail` is the same object as the property `error`.
+ * @fires {CustomEvent<GaussianSplatError>} shader-error - Fired when the function of `splatShader` does not compile; `detail` contains the line. The scene is drawn without it.
+ * @fires {CustomEvent<CameraChangeDetail>} camera-change - Fired when the camera has moved; `detail.source` tells what moved it.
+ * @fires {CustomEvent<ViewChangeDetail>} view-change - Fired when the camera starts to move to a view of the list.
  * @fires {CustomEvent<WalkReadyDetail>} walk-ready - Fired when the floor of `navigation="walk"` is known and the camera stands on it.
- * @fires {CustomEvent<ImmersiveStatusDetail>} vr-status - VR can be started, has started, is over, or failed.
- * @fires {CustomEvent<ImmersiveStatusDetail>} ar-status - The same for AR; the object stands in the room.
- * @fires {CustomEvent<MeasureDetail>} measure - A visitor has measured a length.
- * @fires {Event} poster-dismissed - The poster has given way to the scene.
- * @fires {CustomEvent<VisibilityDetail>} model-visibility - The element has come into sight, or left it.
- * @fires {CustomEvent<ElementError>} generator-error - A run of the generator failed; the last good frame stays.
- * @fires {Event} inputs-change - The inputs that the page may set are others; `inputs` has them.
- * @fires {CustomEvent<FallbackDetail>} generator-fallback - The generator runs on the CPU; `detail.reason` says why.
- * @fires {Event} play - As of HTMLMediaElement, like those that follow.
- * @fires {Event} playing - The time runs.
- * @fires {Event} waiting - The clip plays, and the frames of this time have not arrived.
- * @fires {Event} pause - The time stands still.
- * @fires {Event} timeupdate - The time has gone on.
- * @fires {Event} seeking - Another time was asked for.
- * @fires {Event} seeked - It is shown.
- * @fires {Event} ended - The time has come to its end.
- * @fires {Event} ratechange - The speed of the time has changed.
- * @fires {Event} volumechange - The sound in the slot `sound` is louder, quieter, muted, or another one.
- * @fires {Event} durationchange - The length of the time is known.
- * @fires {Event} loadedmetadata - Likewise.
- * @fires {Event} loadstart - Loading has begun.
- * @fires {Event} loadeddata - The first frame is there.
- * @fires {Event} canplay - Likewise.
- * @fires {Event} emptied - The scene was taken away.
- * @fires {Event} contextlost - The GPU device was lost; the element recovers by itself.
- * @fires {Event} contextrestored - The frame is back.
+ * @fires {CustomEvent<ImmersiveStatusDetail>} vr-status - Fired when VR becomes available, starts, ends, or fails.
+ * @fires {CustomEvent<ImmersiveStatusDetail>} ar-status - Fired when AR becomes available, starts, ends, or fails, and when the object is placed in the room.
+ * @fires {CustomEvent<MeasureDetail>} measure - Fired when a visitor has measured a length.
+ * @fires {Event} poster-dismissed - Fired when the poster is dismissed.
+ * @fires {CustomEvent<VisibilityDetail>} model-visibility - Fired when the element enters or leaves the viewport.
+ * @fires {CustomEvent<ElementError>} generator-error - Fired when a run of the generator fails; the last valid frame stays.
+ * @fires {Event} inputs-change - Fired when the set of inputs available to the page changes; `inputs` lists them.
+ * @fires {CustomEvent<FallbackDetail>} generator-fallback - Fired when the generator runs on the CPU; `detail.reason` contains the reason.
+ * @fires {Event} play - Fired when playback is requested, as by HTMLMediaElement; so are the following events.
+ * @fires {Event} playing - Fired when playback starts or resumes.
+ * @fires {Event} waiting - Fired when playback stops because the frames of the current time have not arrived.
+ * @fires {Event} pause - Fired when playback is paused.
+ * @fires {Event} timeupdate - Fired when the current time changes.
+ * @fires {Event} seeking - Fired when a seek starts.
+ * @fires {Event} seeked - Fired when the sought time is shown.
+ * @fires {Event} ended - Fired when playback reaches the end.
+ * @fires {Event} ratechange - Fired when the playback rate changes.
+ * @fires {Event} volumechange - Fired when the sound in the slot `sound` changes its volume, is muted, or is replaced.
+ * @fires {Event} durationchange - Fired when the duration becomes known or changes.
+ * @fires {Event} loadedmetadata - Fired when the duration becomes known.
+ * @fires {Event} loadstart - Fired when loading starts.
+ * @fires {Event} loadeddata - Fired when the first frame is available.
+ * @fires {Event} canplay - Fired when the first frame is available and playback can start.
+ * @fires {Event} emptied - Fired when the scene is removed.
+ * @fires {Event} contextlost - Fired when the GPU device is lost; the element recovers automatically.
+ * @fires {Event} contextrestored - Fired when the image is restored after a lost device.
  */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class GaussianSplatElement extends ViewingMethods {
-  /** The GPU device of all elements. A page with a device of its own may put `new SharedDevice(...)` here beforehand. */
+  /** The GPU device of all elements. A page with its own device may set `new SharedDevice(...)` here first. */
   static sharedDevice = new SharedDevice();
   /** Loads the scenes of all elements. */
   static sceneLoader = new SceneLoader(undefined, () => GaussianSplatElement.workerLocation);
-  /** How long a removed element keeps its scene, in milliseconds: moving it within the page costs nothing. */
+  /** Milliseconds that a removed element keeps its scene, so that moving it within the page costs nothing. */
   static releaseDelay = 1_000;
   /**
-   * Bytes of GPU memory that one scene may take; a larger one is refused with `out-of-memory/budget` before any of it is allocated. null, the
-   * default: half of the memory that the browser says the device has (`navigator.deviceMemory`); where it does not say, 512 MB on touch screens, else no limit. All
-   * scenes of a page together may take the default, or this if it is more.
+   * Upper limit of the GPU memory of one scene in bytes; a larger one is rejected with `out-of-memory/budget` before
+   * anything is allocated. null, the default: half of the device memory that the browser reports
+   * (`navigator.deviceMemory`); if it reports none, 512 MB on touch screens, else no limit. All scenes of a page
+   * together may take the default, or this if it is more.
    */
   static memoryBudget: number | null = null;
   /**
-   * What one load may cost, for pages whose visitors choose the scenes: `{ maxSplats, maxBytes, maxSeconds }`. More is refused with `out-of-memory/budget` before it is allocated. Default
-   * of `maxBytes`, memory of the page in which the file counts double: eight times {@link memoryBudget}, 4 GiB at most. `origins` are other servers that manifests may name files on.
+   * Limits of one load, for pages whose visitors choose the scenes: `{ maxSplats, maxBytes, maxSeconds }`. Larger loads
+   * are rejected with `out-of-memory/budget` before the allocation. `maxBytes` limits CPU memory, and each file counts
+   * twice; its default is eight times {@link memoryBudget}, at most 4 GiB. `origins` are other servers that manifests
+   * may refer to.
    */
   static sceneLimits: SceneLimits = {};
   /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */
@@ -158,7 +161,7 @@ export class GaussianSplatElement extends ViewingMethods {
   readonly #internals: ElementInternals | null;
   #liveValues: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
   #strings: SpokenStrings = {};
-  /** What the page has set of the camera since it was last applied. */
+  /** Camera attributes that the page has set since they were last applied. */
   readonly #set = new Set<keyof CameraSettings>();
   #controlObserver: MutationObserver | undefined;
   readonly #warned = new Set<string>();
@@ -172,51 +175,57 @@ export class GaussianSplatElement extends ViewingMethods {
     this.stage = new Stage(this, GaussianSplatElement.#hostOf(this));
   }
 
-  /** True while the scene is shown. */
+  /** Whether the scene is shown. */
   get loaded(): boolean {
     return this.stage.sources.state === 'ready';
   }
 
   /**
-   * Fulfils, and never rejects, when there is nothing left to wait for: the scene is shown ({@link loaded}), it cannot
-   * be ({@link error}), or there is none. A lazy element that is never scrolled to keeps one waiting.
+   * Resolves, and never rejects, when nothing is pending: the scene is shown ({@link loaded}), it failed ({@link
+   * error}), or there is none. A lazy element that never enters the viewport stays pending.
    */
   get ready(): Promise<void> {
     return this.updateComplete.then(() => this.stage.settled).then(() => undefined);
   }
 
   /**
-   * Share of the loading that is done, 0..1; 0 too while its size is not known. Of a generator: the bytes of its models and of ONNX Runtime are three
-   * quarters, warming up is the rest.
+   * Loading progress, 0..1; 0 while the size is unknown. For a generator the bytes of its models and of ONNX Runtime
+   * are three quarters, warm-up is the rest.
    */
   get progress(): number {
     return this.loaded ? 1 : (this.stage.sources.progress ?? 0);
   }
 
-  /** Why no scene is shown, or null. */
+  /** Reason that no scene is shown, or null. */
   get error(): ElementError | null {
     return this.stage.sources.error;
   }
 
-  /** What the page may set of the models that are shown, from their contracts: for your own controls. Empty without a model; `inputs-change` tells of others. */
+  /**
+   * Inputs of the current models that the page may set, from their contracts, for your own controls. Empty without a
+   * model; `inputs-change` reports changes.
+   */
   get inputs(): readonly GeneratorInput[] {
     return this.stage.inputs;
   }
 
   /**
-   * What is computed, drawn, seen and in memory, what frames are drawn with, and why; null where no scene is shown. Counts of the frame are those of
-   * the last {@link updateStats}.
+   * Statistics of splats, memory, quality and backend, with reasons; null if no scene is shown. Counts of the frame are
+   * those of the last {@link updateStats}.
    */
   get stats(): SceneStats | null {
     return this.stage.stats;
   }
 
-  /** Counts what the frame shown draws and what of it can be seen. Asks the GPU and draws the view once more: for panels, not for every frame. */
+  /**
+   * Counts the drawn and the visible splats of the current frame. Reads back from the GPU and draws the view once more:
+   * call it for panels, not for every frame.
+   */
   updateStats(): Promise<SceneStats | null> {
     return this.stage.updateStats();
   }
 
-  /** Gives the keyboard to the scene, where the camera can be moved; else as of HTMLElement. */
+  /** Focuses the scene if the camera can be moved; otherwise same as on HTMLElement. */
   override focus(options?: FocusOptions): void {
     const surface = this.renderRoot?.querySelector<HTMLElement>('#view[tabindex]');
     if (surface) surface.focus(options);
@@ -225,7 +234,8 @@ export class GaussianSplatElement extends ViewingMethods {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    // Names of controls are the model's: no list of observed attributes can hold them. Lit observes those of its own properties.
+    // The model defines the names of controls, so they cannot be listed in observedAttributes. Lit observes its own
+    // properties.
     this.#controlObserver ??= new MutationObserver((records) => {
       const counts = (name: string | null): boolean => name === 'aria-label' || !!name?.startsWith(CONTROL_PREFIX);
       if (!records.some(({ attributeName }) => counts(attributeName))) return;
@@ -240,22 +250,23 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#controlObserver?.disconnect();
   }
 
-  /** Style sheets stay behind in the document that made them, and so does the image where that has lost its window. */
+  /** Style sheets do not move to another document, and neither does the frame if its document has lost its window. */
   adoptedCallback(from: Document): void {
     if (this.shadowRoot) adoptStyles(this.shadowRoot);
     if (from.defaultView === null) this.stage.leaveWindowless();
   }
 
-  /** `moveBefore()` takes the element elsewhere as it is: its being here lets the browser spare both callbacks above. */
+  /** `moveBefore()` moves the element with its state: this callback replaces the two above. */
   connectedMoveCallback(): void {
     this.requestUpdate();
   }
 
   protected override createRenderRoot(): HTMLElement | DocumentFragment {
-    // What a server put into a declarative shadow root gives way, in the same task, to the element's own first rendering.
+    // Server-rendered content of a declarative shadow root is replaced, in the same task, by the element's own first
+    // rendering.
     if (!isServer) this.shadowRoot?.replaceChildren();
     if (isServer || this.ownerDocument === document) return super.createRenderRoot();
-    // Lit's style sheets are of the document that this code runs in: others refuse them.
+    // Lit's style sheets belong to the document of this script, and others reject them.
     const root = this.shadowRoot ?? this.attachShadow(GaussianSplatElement.shadowRootOptions);
     adoptStyles(root);
     return root;
@@ -273,14 +284,14 @@ export class GaussianSplatElement extends ViewingMethods {
     if (changed.size > 0) this.stage.requestFrame();
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
-    // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.
+    // Set through the style object, which a strict Content-Security-Policy allows, unlike the attribute.
     if (bar) bar.style.transform = `scaleX(${this.stage.sources.progress ?? 0})`;
   }
 
   protected override render(): TemplateResult {
     const { sources, reveal, behaviours, labels } = this.stage;
     const { state, progress, hasPicture } = sources;
-    // One of several scenes that fails leaves the others visible.
+    // If one of several scenes fails, the others stay visible.
     const error = hasPicture ? null : this.stage.sources.error;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
@@ -306,7 +317,7 @@ export class GaussianSplatElement extends ViewingMethods {
     });
   }
 
-  /** What the stage knows of an element. */
+  /** Interface of the element for its core. */
   static #hostOf(element: GaussianSplatElement): StageHost {
     return {
       source: element,
@@ -327,7 +338,7 @@ export class GaussianSplatElement extends ViewingMethods {
     };
   }
 
-  /** The page's own words, where it has some; none for a poster that stands in for the scene. */
+  /** The page's own text, if there is one; none for a poster that replaces the scene. */
   #spokenError(error: ElementError): string {
     const isUnsupported = error.code === 'unsupported';
     const own = this.#slotted(isUnsupported ? 'fallback' : 'error')?.textContent.trim();
@@ -342,7 +353,7 @@ export class GaussianSplatElement extends ViewingMethods {
     return this.querySelector?.(`:scope > [slot=${name}]`) ?? null;
   }
 
-  /** A person clicked the poster: the keyboard goes on in the scene. */
+  /** A visitor clicked the poster, so the keyboard focus moves to the scene. */
   readonly #onReveal = (): void => {
     this.dismissPoster();
     void this.updateComplete.then(() => this.focus());
@@ -350,11 +361,11 @@ export class GaussianSplatElement extends ViewingMethods {
 
   readonly #onReset = (): void => {
     this.stage.act({ type: 'reset' });
-    // The button goes.
+    // The button is removed.
     this.focus({ preventScroll: true });
   };
 
-  /** Lit passes over a value that is set again; where the camera goes, it counts: a bookmark works twice. */
+  /** Lit ignores a value that is set again; for the camera it counts, so that a bookmark works twice. */
   override requestUpdate(...request: Parameters<ReactiveElement['requestUpdate']>): void {
     const setting = CAMERA_SETTINGS.get(request[0]);
     if (setting === undefined) return super.requestUpdate(...request);
@@ -362,7 +373,7 @@ export class GaussianSplatElement extends ViewingMethods {
     super.requestUpdate();
   }
 
-  /** Attributes count at once for those who call a method right after setting one. */
+  /** Attributes apply at once for code that calls a method right after setting one. */
   protected override applyAttributes(): void {
     const before = this.#attributes;
     this.#attributes = this.#readAttributes();
@@ -388,7 +399,7 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#strings = strings ?? {};
   }
 
-  /** The attribute `time`; NaN where it says nothing. */
+  /** The attribute `time`; NaN if it is absent. */
   get #startTime(): number {
     return this.time === null || this.time === '' ? NaN : Number(this.time);
   }
@@ -396,7 +407,7 @@ export class GaussianSplatElement extends ViewingMethods {
   #seekToAttribute(): void {
     const seconds = this.#startTime;
     if (Number.isFinite(seconds)) {
-      // A scene that is still to come begins there anyway.
+      // A pending scene starts there anyway.
       if (this.stage.playback.canPlay && !this.stage.sources.own.isLeaving) this.currentTime = seconds;
     } else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
   }
@@ -420,12 +431,12 @@ export class GaussianSplatElement extends ViewingMethods {
     try {
       for (const name of STATES) this.#internals?.states[active[name] ? 'add' : 'delete'](name);
     } catch {
-      // Browsers before :state() accept no plain names; only styling is lost.
+      // Browsers before :state() reject plain names; only styling is lost.
     }
   }
 }
 
-/** Methods of VR and AR come with their code. */
+/** Methods of VR and AR are added with their code. */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging, @typescript-eslint/no-empty-object-type
 export interface GaussianSplatElement extends ImmersiveMethods, SoundProperties {}
 

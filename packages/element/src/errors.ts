@@ -1,16 +1,16 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
 import type { SpokenStrings } from './words.js';
 
-/** Families of failure, as `element.error.code` gives them. */
+/** Failure families, the values of `element.error.code`. */
 export type ElementErrorCode = 'unsupported' | 'network' | 'decode' | 'contract' | 'device-lost' | 'out-of-memory';
 
-/** Why an element shows no scene. */
+/** Reason that an element shows no scene. */
 export interface ElementError {
-  /** Family of the failure: what a page decides by. */
+  /** Family of the failure, for decisions by the page. */
   readonly code: ElementErrorCode;
   /** The full, stable code, for example `network/status`. */
   readonly reason: ErrorCode;
-  /** What was expected, what was found, where, and what to do: for the person who made the page. */
+  /** Expected and found values, place and remedy, for the author of the page. */
   readonly message: string;
   readonly cause: unknown;
 }
@@ -24,10 +24,11 @@ const FAMILIES: readonly ElementErrorCode[] = [
   'out-of-memory',
 ];
 
-/** Any failure in the element's own terms. */
+/** Converts any failure to an error of the element. */
 export function toElementError(error: unknown): ElementError {
   if (error instanceof GaussianSplatError) {
-    // The families are the element's codes; an `argument/*` error means that a scene passed its reader but not the renderer.
+    // The families are the element's codes; an `argument/*` error means that a scene passed its reader but not the
+    // renderer.
     const code = FAMILIES.find((family) => family === error.family) ?? 'decode';
     return { code, reason: error.code, message: error.message, cause: error };
   }
@@ -35,14 +36,14 @@ export function toElementError(error: unknown): ElementError {
   return { code: 'decode', reason: 'decode/corrupt', message, cause: error };
 }
 
-/** One sentence for visitors of the page, who can mend little: the page's own, or an English one by what went wrong. */
+/** One sentence for visitors, who can fix little: the page's own, or an English one for the kind of failure. */
 export function visitorMessage({ code, reason }: ElementError, strings: SpokenStrings): string {
   const own = strings[`error-${code}`];
   if (own !== undefined) return own;
   return visitorMessages[reason] ?? VISITOR_MESSAGES[code];
 }
 
-/** Those of single errors; code that makes such an error adds its own. */
+/** Messages of single errors; code that creates such an error adds its own. */
 export const visitorMessages: Partial<Record<ErrorCode, string>> = {
   'unsupported/wrong-image': 'This 3D scene cannot be drawn correctly here: update the browser or graphics driver.',
 };

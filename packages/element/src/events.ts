@@ -3,7 +3,7 @@ import type { ScenePoint } from './camera/values.js';
 import type { ElementError } from './errors.js';
 
 /**
- * Who moved the camera: a person, the element itself (framing a scene or a new size), or the page's own code
+ * Source of a camera move: a visitor, the element itself (framing a scene or a new size), or the page's own code
  * (attributes and methods).
  */
 export type CameraChangeSource = 'user-interaction' | 'automatic' | 'none';
@@ -15,7 +15,7 @@ export interface CameraChangeDetail {
 export interface ViewChangeDetail {
   /** The view's name. */
   readonly name: string;
-  /** Its place in the list, from 0. */
+  /** Its index in the list, from 0. */
   readonly index: number;
 }
 
@@ -26,21 +26,21 @@ export interface WalkReadyDetail {
 
 export interface ImmersiveStatusDetail {
   readonly status: 'not-presenting' | 'session-started' | 'object-placed' | 'failed';
-  /** Why it failed. */
+  /** Reason of a failure. */
   readonly reason?: string;
 }
 
 export interface MeasureDetail {
-  /** Ends of the ruler, viewer space. */
+  /** Ends of the ruler in viewer space. */
   readonly from: ScenePoint;
   readonly to: ScenePoint;
-  /** In units of the scene. */
+  /** Length in units of the scene. */
   readonly length: number;
-  /** What the length may be off by, in units of the scene. */
+  /** Uncertainty of the length, in units of the scene. */
   readonly uncertainty: number;
-  /** The length in meters; null unless the attribute `unit` says how long a unit is. */
+  /** The length in meters; null unless the attribute `unit` defines the unit. */
   readonly meters: number | null;
-  /** Meters of a unit, where that is known. */
+  /** Meters per unit; null if unknown. */
   readonly unit: number | null;
 }
 
@@ -55,7 +55,7 @@ export interface VisibilityDetail {
 }
 
 export interface FallbackDetail {
-  /** Why the generator does not run on the GPU, for readers. */
+  /** Reason that the generator does not run on the GPU, for display. */
   readonly reason: string;
 }
 
@@ -66,48 +66,51 @@ export interface PreviewDetail {
 
 /** `detail` of the event `hotspot-visibility`, which is fired on a hotspot itself. */
 export interface HotspotVisibilityDetail {
-  /** Whether a visitor can see the hotspot's point: it is before the camera, faces it, and nothing hides it. */
+  /** Whether the hotspot's point is visible: in front of the camera, facing it, and not occluded. */
   readonly visible: boolean;
 }
 
 /** Events of `<gaussian-splat>`. None of them bubbles. */
 export interface GaussianSplatEventMap {
-  /** The scene's first frame is on the screen. */
+  /** Fired when the scene's first frame is on the screen. */
   load: CustomEvent<LoadDetail>;
-  /** Bytes have arrived. The first and the last event of a load always fire. */
+  /** Fired when bytes have arrived. The first and the last event of a load always fire. */
   progress: ProgressEvent;
-  /** A part of the scene is shown while the rest of it loads: fewer splats, or splats without their view-dependent colours. */
+  /**
+   * Fired when a part of the scene is shown while the rest of it loads: fewer splats, or splats without their
+   * view-dependent colors.
+   */
   preview: CustomEvent<PreviewDetail>;
-  /** The function of `splatShader` does not compile; `detail` names the line. The scene is drawn without it. */
+  /** Fired when the hook of `splatShader` does not compile; `detail` names the line. The scene is drawn without it. */
   'shader-error': CustomEvent<GaussianSplatError>;
-  /** The scene cannot be shown; the same object as `element.error`. */
+  /** Fired when the scene cannot be shown; `detail` is the same object as `element.error`. */
   error: CustomEvent<ElementError>;
-  /** The camera has moved; at most once a frame. */
+  /** Fired when the camera has moved; at most once in each frame. */
   'camera-change': CustomEvent<CameraChangeDetail>;
-  /** The camera sets out for a view of the list. */
+  /** Fired when the camera starts moving to a view of the list. */
   'view-change': CustomEvent<ViewChangeDetail>;
   /** Fired when the floor of `navigation="walk"` is known and the camera stands on it. */
   'walk-ready': CustomEvent<WalkReadyDetail>;
-  /** VR can be started, has started, is over, or failed. */
+  /** Fired when VR can be started, has started, has ended, or failed. */
   'vr-status': CustomEvent<ImmersiveStatusDetail>;
-  /** The same for AR; the object stands in the room. */
+  /** The same for AR; the object is placed in the real environment. */
   'ar-status': CustomEvent<ImmersiveStatusDetail>;
-  /** A visitor has measured a length. */
+  /** Fired when a visitor has measured a length. */
   measure: CustomEvent<MeasureDetail>;
-  /** The poster has given way to the scene. */
+  /** Fired when the poster is dismissed and the scene becomes visible. */
   'poster-dismissed': Event;
-  /** The element has come into sight, or left it. */
+  /** Fired when the element enters or leaves the viewport. */
   'model-visibility': CustomEvent<VisibilityDetail>;
-  /** A run of the generator failed; the last good frame stays, and the next change tries again. */
+  /** Fired when a run of the generator fails; the last good frame stays, and the next change tries again. */
   'generator-error': CustomEvent<ElementError>;
-  /** The inputs that the page may set are others: see the property `inputs`. */
+  /** Fired when the inputs that the page may set change: see the property `inputs`. */
   'inputs-change': Event;
-  /** The generator runs on the CPU, because of the reason given. */
+  /** Fired when the generator runs on the CPU, with the reason. */
   'generator-fallback': CustomEvent<FallbackDetail>;
-  /** Loading and time, as of HTMLMediaElement. */
+  /** Loading and playback, same as on HTMLMediaElement. */
   play: Event;
   playing: Event;
-  /** A clip has to wait for what comes next; `playing` follows. */
+  /** Fired when a clip waits for its next frames; `playing` follows. */
   waiting: Event;
   pause: Event;
   timeupdate: Event;
@@ -115,7 +118,7 @@ export interface GaussianSplatEventMap {
   seeked: Event;
   ended: Event;
   ratechange: Event;
-  /** The sound of the scene is louder, quieter, muted or another one. */
+  /** Fired when the sound of the scene becomes louder, quieter, muted or is replaced. */
   volumechange: Event;
   durationchange: Event;
   loadedmetadata: Event;
@@ -123,15 +126,15 @@ export interface GaussianSplatEventMap {
   loadeddata: Event;
   canplay: Event;
   emptied: Event;
-  /** The GPU device was lost. The element recovers by itself. */
+  /** Fired when the GPU device is lost. The element recovers automatically. */
   contextlost: Event;
-  /** The frame is back after a loss. */
+  /** Fired when the frame is restored after a loss. */
   contextrestored: Event;
 }
 
 declare global {
   interface HTMLElementEventMap {
-    /** A hotspot of a `<gaussian-splat>` has come into sight, or is hidden now. */
+    /** Fired when a hotspot of a `<gaussian-splat>` becomes visible or hidden. */
     'hotspot-visibility': CustomEvent<HotspotVisibilityDetail>;
   }
 }

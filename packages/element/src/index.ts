@@ -1,4 +1,6 @@
-/** Registers `<gaussian-splat>`. For the class alone, without registration, import `@gaussian-splat/element/element.js`. */
+/**
+ * Registers `<gaussian-splat>`. For the class alone, without registration, import `@gaussian-splat/element/element.js`.
+ */
 import { GaussianSplatElement } from './element.js';
 
 export type { ElementError, ElementErrorCode } from './errors.js';
@@ -56,7 +58,7 @@ const CONFIGURABLE = [
   ] as const),
 ] as const;
 
-/** What a page may put into `globalThis.GaussianSplatElement` before this module runs: statics of the class. */
+/** Static properties of the class that a page may set in `globalThis.GaussianSplatElement` before this module runs. */
 export type GaussianSplatConfiguration = Partial<Pick<typeof GaussianSplatElement, (typeof CONFIGURABLE)[number]>>;
 
 /** Script tags without a build step cannot set statics before the first element is upgraded. */

@@ -1,23 +1,25 @@
 /**
- * Work of which only the latest request counts: whatever asks anew ends what was asked for before. What is ended finds its signal aborted, does nothing more, and what it fails with
- * then is nobody's concern.
+ * Runs only the latest task: a new one aborts the previous one. An aborted task must stop, and its errors are ignored.
  */
 export class LatestTask {
   #running = new AbortController();
 
-  /** Of the request that counts. */
+  /** Signal of the current task. */
   get signal(): AbortSignal {
     return this.#running.signal;
   }
 
-  /** Ends what runs. @returns the signal of what comes after */
+  /** Aborts the current task. @returns The signal of the next one. */
   renew(): AbortSignal {
     this.#running.abort();
     this.#running = new AbortController();
     return this.signal;
   }
 
-  /** Ends what runs and does this instead; `failed` hears why it could not be done, unless another request has come meanwhile. */
+  /**
+   * Aborts the current task and runs this one; `failed` is called with its error, unless another task has started
+   * meanwhile.
+   */
   run(work: (signal: AbortSignal) => Promise<void>, failed: (error: unknown) => void): void {
     const signal = this.renew();
     work(signal).catch((error: unknown) => {

@@ -6,60 +6,64 @@ import { SceneTimeRanges } from './time-ranges.js';
 import type { LitElement } from 'lit';
 
 /**
- * The properties that a page may set, for the typings of frameworks: those of the attributes, and of time `currentTime` and `playbackRate`.
- * Methods and what can only be read (`error`, `duration`, ...) are left out: a framework that sets them throws.
+ * The properties that a page may set, for the typings of frameworks: those of the attributes, and of playback
+ * `currentTime` and `playbackRate`. Methods and read-only properties (`error`, `duration`, ...) are excluded, because a
+ * framework that sets them throws.
  */
 export type SettableProperties = Partial<
   Pick<SplatProperties, Exclude<keyof SplatProperties, keyof LitElement>> &
     Pick<MediaProperties, 'currentTime' | 'playbackRate'>
 >;
 
-/** What HTMLMediaElement.readyState says of a scene: nothing yet, the last image and no more, or all that comes next. */
+/** Values of HTMLMediaElement.readyState for a scene: no data, only the current frame, or enough to play. */
 const HAVE_NOTHING = 0;
 const HAVE_CURRENT_DATA = 2;
 const HAVE_ENOUGH_DATA = 4;
 
 const isSaid = (value: number | null | undefined): boolean => value !== null && value !== undefined;
 
-/** Time of a scene that moves, in the words of HTMLMediaElement: whatever drives a video drives it. */
+/** Playback of an animated scene, with the interface of HTMLMediaElement, so that controls for video work. */
 export abstract class MediaProperties extends SplatProperties {
   /** @internal */
   protected abstract readonly stage: Stage;
-  /** Fulfils when there is nothing left to wait for. */
+  /** Resolves when nothing is pending. */
   abstract get ready(): Promise<void>;
 
-  /** Seconds into a scene that moves; setting it seeks. Set before there is one, or just after another `src`, it is where that one begins. */
+  /**
+   * Playback position in seconds; setting it seeks. Set before a scene is loaded, or just after another `src`, it is
+   * the start position of that scene.
+   */
   get currentTime(): number {
     const { playback } = this.stage;
     return this.isUpdatePending && this.stage.sources.own.isLeaving ? playback.nextStart : playback.currentTime;
   }
 
   set currentTime(seconds: number) {
-    // Frameworks say so of a property that they do not set any more.
+    // Frameworks set undefined or null to unset a property.
     if (isSaid(seconds)) this.stage.seek(seconds);
   }
 
-  /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
+  /** Duration in seconds; NaN without an animated scene, Infinity for one without an end. */
   get duration(): number {
     return this.stage.playback.duration;
   }
 
-  /** Whether the time stands still; true where nothing moves. */
+  /** Whether playback is paused; true if nothing is animated. */
   get paused(): boolean {
     return this.stage.playback.paused;
   }
 
-  /** Whether the time has come to its end. */
+  /** Whether playback has reached its end. */
   get ended(): boolean {
     return this.stage.playback.ended;
   }
 
-  /** True until the frame of the time that was set is shown. */
+  /** Whether the frame at the last set time is not shown yet. */
   get seeking(): boolean {
     return this.stage.playback.seeking;
   }
 
-  /** Speed of the time; 1 is that of the clock, negative runs backwards. */
+  /** Speed of playback; 1 is real time, negative values play backwards. */
   get playbackRate(): number {
     return this.stage.playback.playbackRate;
   }
@@ -68,18 +72,18 @@ export abstract class MediaProperties extends SplatProperties {
     this.stage.playback.playbackRate = isSaid(rate) ? rate : 1;
   }
 
-  /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is shown, 2 while a clip has to wait for what comes next. */
+  /** Same as on HTMLMediaElement: 0 without a scene, 4 once it is shown, 2 while a clip waits for its next frames. */
   get readyState(): number {
     if (this.stage.sources.state !== 'ready') return HAVE_NOTHING;
     return this.#live?.isLacking?.(this.currentTime) ? HAVE_CURRENT_DATA : HAVE_ENOUGH_DATA;
   }
 
-  /** Times that can be sought: all of a scene with an end, none of others. */
+  /** Seekable times: the whole of a scene with an end, none of others. */
   get seekable(): SceneTimeRanges {
     return new SceneTimeRanges(this.duration);
   }
 
-  /** Times that need no more bytes: the same, but for a clip, of which groups come and go. */
+  /** Times that need no more bytes: the same, except for a clip, whose groups are loaded and discarded. */
   get buffered(): SceneTimeRanges {
     return new SceneTimeRanges(this.duration, this.#live?.buffered);
   }
@@ -94,15 +98,15 @@ export abstract class MediaProperties extends SplatProperties {
   }
 
   /**
-   * Lets the time run, once the scene is there. Frames are drawn as the page has them; the generator follows as fast as it can.
-   * A poster that waits for a person gives way, and a lazy scene out of sight is loaded.
-   * @returns rejects with a `NotSupportedError` where there is no scene that moves, and with an `AbortError` if `pause()` or another
-   * `src` comes before it does.
+   * Starts playback, once the scene is loaded. Frames are drawn at the page's rate; the generator follows as fast as it
+   * can. Dismisses a manual poster and loads a lazy scene that is off-screen.
+   * @returns Rejects with a `NotSupportedError` if there is no animated scene, and with an `AbortError` if `pause()` or
+   * another `src` intervenes.
    */
   async play(): Promise<void> {
     const { playback } = this.stage;
     const { pauses } = playback;
-    // A scene that was set a moment ago is asked for first: the end of the one before is no reason to give up.
+    // A scene that was just set is requested first: the removal of the previous one is no reason to reject.
     await this.updateComplete;
     if (playback.pauses !== pauses) throw notPlayed();
     this.stage.prepareToPlay();
@@ -111,7 +115,7 @@ export abstract class MediaProperties extends SplatProperties {
     playback.play();
   }
 
-  /** Lets the time stand still. */
+  /** Pauses playback. */
   pause(): void {
     this.stage.sources.own.hasBegun = true;
     this.stage.playback.pause();

@@ -16,7 +16,10 @@ export class Member {
     this.#placement = this.#add({ bounds: this.#bounds });
   }
 
-  /** How it stands in the world. Other splats of the source may be drawn now than in the last frame: levels of detail, or a sequence's next buffers. */
+  /**
+   * Its placement in the world. The drawn splats of the source may have been replaced since the last frame: by levels
+   * of detail, or by a sequence's next buffers.
+   */
   get placement(): Placement {
     const before = this.#placement;
     if (before.scene !== this.scene.drawn) {

@@ -1,4 +1,4 @@
-/** Pictures for scripts: of any size, over a colour, and with the filters that the page's CSS puts on the element. */
+/** Images for scripts: any size, a background color, and the CSS filters of the element. */
 import type { PixelSize } from './controllers/size-controller.js';
 import type { ViewController } from './controllers/view-controller.js';
 import { wasLost } from './gpu/device-failures.js';
@@ -9,14 +9,14 @@ export interface PictureHost {
   readonly canvas: HTMLCanvasElement | null;
   readonly view: Pick<ViewController, 'painter'>;
   warn(sentence: string): void;
-  /** Draws a frame into the element's canvas now; null where there is nothing to draw. */
+  /** Draws a frame into the element's canvas now; null if there is nothing to draw. */
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
 }
 
 /** Premultiplied, 0..1. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
 
-/** Why there is no picture of a device that is lost. */
+/** Message for an image whose device was lost. */
 const LOST = 'The GPU device was lost before the image was drawn: take it again after the event contextrestored';
 
 export async function takePicture(host: PictureHost, options: ImageOptions): Promise<Blob> {
@@ -28,10 +28,10 @@ export async function takePicture(host: PictureHost, options: ImageOptions): Pro
   const blob = new Promise<Blob | null>((resolve) =>
     withFilters(host, drawn).toBlob(resolve, mimeType, qualityArgument),
   );
-  // The page goes on showing what it showed: nothing is presented before this task ends.
+  // The page still shows the earlier frame: nothing is presented before this task ends.
   if (pixels || background !== undefined) host.drawNow();
   const taken = await blob;
-  // A device that was lost before it had drawn leaves an empty picture, and says so later.
+  // A device that was lost before drawing leaves an empty image and reports the loss later.
   if (painter && (await wasLost(painter))) throw new DOMException(LOST, 'InvalidStateError');
   if (taken === null) throw new DOMException(`The image could not be written as ${mimeType}`, 'EncodingError');
   return taken;
@@ -43,7 +43,7 @@ export const nothingToDraw = (): DOMException =>
     'InvalidStateError',
   );
 
-/** One side alone keeps the shape of the element. null without either. */
+/** One side alone keeps the aspect ratio of the element. @returns null without either */
 function sizeOf({ width, height }: ImageOptions, canvas: HTMLCanvasElement | null, most: number): PixelSize | null {
   if (canvas === null || (width === undefined && height === undefined)) return null;
   const aspect = canvas.width / canvas.height;
@@ -66,7 +66,7 @@ function rgbaOf(color: string): Rgba {
   return [red * alpha, green * alpha, blue * alpha, alpha];
 }
 
-/** What the screen shows of a canvas whose element the page's CSS filters. */
+/** The canvas with the CSS filters of its element applied. */
 function withFilters(host: PictureHost, drawn: HTMLCanvasElement): HTMLCanvasElement {
   const filter = [drawn, host.element]
     .map((node) => getComputedStyle(node).filter)

@@ -18,19 +18,20 @@ export interface QueryHost {
     readonly meshes: { readonly value: Pick<Meshes, 'hit'> | undefined };
   };
   readonly camera: Pick<CameraController, 'viewerFrame'>;
-  /** Looks into the last frame. Rejects if it is gone. */
+  /** Reads surface positions of the last frame. Rejects if the frame is gone. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
   readonly view: Pick<ViewController, 'painter'>;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   readonly drawnFrom: Camera | undefined;
-  /** What the frame covers, once it is rendered. */
+  /** Element that the frame covers, once it is rendered. */
   readonly surface: HTMLElement | null;
 }
 
 /**
- * The visible surface under a point of the page, and whose it is, read back from the GPU beside the frames.
- * @param clientX CSS pixels, as of a MouseEvent.
- * @returns null beside the scene, where it is more transparent than not, or if the frame is gone meanwhile.
+ * The visible surface under a point of the page, and the element that it belongs to, read back from the GPU
+ * asynchronously.
+ * @param clientX CSS pixels, like that of a MouseEvent.
+ * @returns null outside the scene, on parts less than half opaque, or if the frame is gone meanwhile
  */
 export async function positionFromPoint(
   host: QueryHost,
@@ -46,7 +47,7 @@ export async function positionFromPoint(
   try {
     const [answer] = await host.probe([{ x, y }]);
     if (!answer || answer.depth === null) return null;
-    // The shadow belongs to nobody.
+    // The shadow belongs to no element.
     const placement = answer.splat?.placement;
     if (placement && !host.sources.members.some((member) => member.placement === placement)) return null;
     const { near, depth, far } = answer;
@@ -56,13 +57,13 @@ export async function positionFromPoint(
     const point = new ScenePoint(...toViewer(camera.viewerFrame, place), uncertainty);
     return Object.assign(point, { distance: distance(eye, place), ...whose(host, answer, eye, place) });
   } catch (error) {
-    // A device that was lost meanwhile has nothing more to say, and its loss is told elsewhere.
+    // A lost device is reported elsewhere.
     if (await isGone(painter)) return null;
     throw error;
   }
 }
 
-/** The element that a surface belongs to, and what part of it was met. */
+/** The element that a surface belongs to, and the part of it that was hit. */
 function whose(
   { element, sources, camera }: QueryHost,
   { splat }: ProbeAnswer,

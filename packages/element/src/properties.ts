@@ -4,10 +4,10 @@ import { declarations, flags, type AttributeProperties } from './attributes.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { ControlValues } from './live/values.js';
 
-/** Those of the element, and under other names those of every element: `click`, `keydown`. */
+/** Events of the element, plus the standard ones of every element, such as `click` and `keydown`. */
 type ElementEvents = GaussianSplatEventMap & Omit<HTMLElementEventMap, keyof GaussianSplatEventMap>;
 
-/** The properties of `<gaussian-splat>` that are attributes, too, and those that Lit has to know besides. */
+/** The properties of `<gaussian-splat>`: reflected attributes, and others declared to Lit. */
 // The interface below gives the attributes of attributes.ts and inherited methods their types: Lit makes the accessors of the first, and has the others.
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class SplatProperties extends LitElement {
@@ -16,17 +16,21 @@ export class SplatProperties extends LitElement {
     inputValues: { attribute: false },
     splatShader: { attribute: false },
     revealProgress: { attribute: false },
-    // Accessors of MediaProperties: named here so that what a page sets before the element is defined reaches them.
+    // Accessors of MediaProperties, declared here so that values set before the element is defined reach them.
     currentTime: { attribute: false, noAccessor: true },
     playbackRate: { attribute: false, noAccessor: true },
   };
 
-  /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
+  /**
+   * Controls of a generator by the names of its inputs; they override the attributes `control-NAME`. Assign a new
+   * object to change values.
+   */
   declare inputValues: ControlValues | null;
 
   /**
-   * A WGSL function of the page for each splat, `{ code, uniforms, animated, moves }`; null for none. New values are a new object; the same code is not compiled again. `shader-error` tells of
-   * one that does not compile.
+   * A WGSL function of the page for each splat, `{ code, uniforms, animated, moves }`; null for none. Assign a new
+   * object to change values; equal code is not compiled again. The event `shader-error` reports code that does not
+   * compile.
    */
   declare splatShader: SplatShader | null;
 
@@ -40,7 +44,7 @@ export class SplatProperties extends LitElement {
 
   constructor() {
     super();
-    // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
+    // Boolean properties start as booleans: frameworks inspect them to decide the meaning of a bare attribute.
     Object.assign(this, Object.fromEntries(flags.map((name) => [name, false])));
   }
 }

@@ -9,7 +9,7 @@ export interface SceneBox {
   readonly max: ScenePoint;
 }
 
-/** Box around nearly all of what is shown; null while nothing is. */
+/** Box around nearly all of the visible splats; null if there are none. */
 export function boxOf(shown: {
   readonly camera: Pick<CameraController, 'viewerFrame'>;
   readonly bounds: SceneBounds | null;

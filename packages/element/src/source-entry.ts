@@ -17,10 +17,10 @@ import type { Member } from './member.js';
 import type { Services, Source } from './stage-host.js';
 import { costOf, type PartStats } from './stats.js';
 
-/** What an entry needs once it belongs to nothing any more. */
+/** Services of an entry that no longer belongs to an element. */
 const NO_SERVICES = { releaseDelay: 0 } as Services;
 
-/** What an entry asks of the element that it belongs to, and what it tells it. */
+/** The interface of the element that an entry uses. */
 export interface EntryStage {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly attributes: Attributes;
@@ -31,12 +31,12 @@ export interface EntryStage {
   /** Rotation from the world to viewer space. */
   readonly frame: ViewerFrame;
   readonly wantsPreviews: boolean;
-  /** Somebody would see the scene. */
+  /** The scene would be visible. */
   readonly isInSight: boolean;
-  /** What moves by itself may. */
+  /** Automatic motion is allowed. */
   readonly mayMove: boolean;
   readonly memoryBudget: number | undefined;
-  /** What the page may set of the models on show. */
+  /** Inputs of the displayed models that the page may set. */
   readonly inputs: readonly GeneratorInput[];
   readonly sources: EntryList;
   requestFrame(): void;
@@ -55,32 +55,35 @@ export interface EntryList {
   contextChanged(type: 'contextlost' | 'contextrestored', entry: SourceEntry): void;
 }
 
-/** Whose source an entry shows: the element itself, or a child of it. */
+/** Owner of an entry's source: the element itself, or a child of it. */
 export interface SourceOwner {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly source: Source;
   readonly liveValues: LiveHost['liveValues'];
-  /** False where it moves by the clock of the element around it. */
+  /** False if it follows the clock of its parent element. */
   readonly hasOwnClock: boolean;
-  /** What it says otherwise than the element. */
+  /** Attributes that differ from those of the element. */
   readonly overrides?: Partial<Attributes>;
-  /** Opens what is no scene of splats. */
+  /** Opens sources other than splats. */
   readonly open?: SceneHost['open'];
-  /** Puts it where it stands; absent where that is the world itself. */
+  /** Sets its transform; absent if its frame is the world's. */
   place?(member: Member, stage: EntryStage): void;
-  /** A camera of the world, as it sees it. */
+  /** A camera of the world in its own coordinates. */
   seenFrom?(camera: Camera, member: Member | undefined, stage: EntryStage): Camera;
   warn(sentence: string): void;
 }
 
-/** The life of one source, be it the element's own or a child's: what is asked for, loaded and shown, its clock, its generator, its levels of detail. */
+/**
+ * The lifecycle of one source of the element or of a child: request, loading, display, clock, generator, and levels of
+ * detail.
+ */
 export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHost, DetailHost {
   readonly owner: SourceOwner;
   readonly scene: SceneController;
   readonly ownClock: PlaybackController;
   readonly live: LiveWiring;
   readonly #source: SourceController;
-  /** Few scenes need it: those with the attribute `detail`, and those that cannot be drawn whole in motion. */
+  /** Only scenes with the attribute `detail`, and those too slow to draw in full during motion, need it. */
   readonly #detail = new Lazy(
     'the code of levels of detail',
     async () => {
@@ -89,16 +92,16 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     },
     () => this.#updateDetail(),
   );
-  /** Of the element that it belongs to, or belonged to last. */
+  /** The element that it belongs to, or belonged to last. */
   #stage: EntryStage | undefined;
   #isIn = false;
-  /** What it has in the world. */
+  /** Its member of the world. */
   member: Member | undefined;
-  /** Share of the loading that is done, 0..1; null while it is not known. */
+  /** Loading progress, 0..1; null while unknown. */
   progress: number | null = null;
-  /** It has played or was told not to: it begins by itself no more. */
+  /** It has played or was paused, so it no longer starts automatically. */
   hasBegun = false;
-  /** Bytes that have arrived, and how many there are. */
+  /** Bytes received, and bytes in total. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
   constructor(owner: SourceOwner, stage?: EntryStage) {
@@ -111,7 +114,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.#source = new SourceController(this);
   }
 
-  // What the stage asks.
+  // Interface of the stage.
 
   get state(): SceneState {
     return this.scene.state;
@@ -136,7 +139,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return this.member !== undefined && (this.state === 'ready' || this.scene.isPreview);
   }
 
-  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  /** Fulfills, and never rejects, once nothing is left to wait for. */
   get settled(): Promise<unknown> {
     return this.scene.settled.then(() => this.#detail.settled);
   }
@@ -150,7 +153,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return { element: this.owner.element, state, error, ...costOf(scene) };
   }
 
-  /** It belongs to this element from now on, or to none, and comes with what it has loaded. */
+  /** Moves the entry to this element, or to none, together with its loaded scene. */
   attach(stage: EntryStage | null): void {
     if (this.#isIn && stage === this.#stage) return this.update();
     if (this.#isIn) this.#stage!.sources.remove(this);
@@ -168,7 +171,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return this.#isIn ? this.#stage!.element : null;
   }
 
-  /** Its owner, or the element around it, may ask for something else now. */
+  /** Reads the attributes again: its owner, or the parent element, may request another source. */
   update(): void {
     if (!this.#isIn) return;
     this.#source.set(this.owner.source);
@@ -177,14 +180,14 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.startPlaying();
   }
 
-  /** It may be loaded, and play, now. */
+  /** Loads and plays if that is allowed now. */
   request(): void {
     if (!this.#isIn) return;
     this.#source.request();
     this.startPlaying();
   }
 
-  /** Loads it although nobody may see it, until another is wanted. */
+  /** Loads the source even if it is not visible, until another one is requested. */
   needNow(): void {
     this.#source.needNow(true);
   }
@@ -195,7 +198,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.owner.element.requestUpdate();
   }
 
-  /** Its owner asks for something else than what is shown or loaded. */
+  /** Its owner requests another source than the displayed or loading one. */
   get isLeaving(): boolean {
     return this.#source.isOther(this.owner.source);
   }
@@ -204,23 +207,23 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return this.#source.postprocess;
   }
 
-  /** The clock of what plays by itself. */
+  /** The clock of a source that plays automatically. */
   get player(): PlaybackController | undefined {
     return this.#stage && this.attributes.autoplay ? this.ownClock : undefined;
   }
 
-  /** Starts what plays by itself, where it may. */
+  /** Starts automatic playback if that is allowed. */
   startPlaying(): void {
     if (!this.hasBegun && this.#stage?.mayMove && this.player?.canPlay) this.ownClock.play();
   }
 
-  /** Puts it where it stands, before a frame. */
+  /** Sets its transform before a frame. */
   place(): void {
-    // Asked for what it draws, a member brings other splats of its source into the world.
+    // Reading a member's count may replace its splats in the world.
     if (this.member?.placement && this.#isIn) this.owner.place?.(this.member, this.#stage!);
   }
 
-  /** What moves goes on to the moment of a frame. The last frame of a scene whose place another will take stays as it is. */
+  /** Advances its motion to the time of a frame. The last frame of a scene about to be replaced stays unchanged. */
   advance(camera: Camera, now: number): void {
     if (this.member && !this.scene.isOutgoing) this.live.advance(this.member.scene, this.#seenFrom(camera), now);
   }
@@ -230,7 +233,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.#detail.value?.reportMotionFrame(isWhole);
   }
 
-  // What the controllers ask.
+  // Interfaces of the controllers.
 
   get element(): HTMLElement {
     return this.owner.element;
@@ -238,7 +241,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
 
   get attributes(): Attributes {
     const { overrides } = this.owner;
-    // A child knows its own before it belongs to an element.
+    // A child has its own attributes before it belongs to an element.
     return overrides ? { ...(this.#stage?.attributes as Attributes), ...overrides } : this.#stage!.attributes;
   }
 
@@ -291,7 +294,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     };
   }
 
-  // What they tell.
+  // Notifications of the controllers.
 
   requestFrame(): void {
     this.#stage?.requestFrame();
@@ -313,7 +316,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.dispatch(new Event(type));
     if (type !== 'play' && type !== 'pause') return;
     this.hasBegun ||= type === 'play';
-    // Custom states and the button tell of them, too.
+    // Custom states and the pause button depend on them, too.
     this.#stage?.element.requestUpdate();
   }
 
@@ -335,7 +338,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     if (this.#isIn) this.#stage!.sources.left(clear);
   }
 
-  /** Out of the world: its splats are about to go, or to be shown elsewhere. */
+  /** Leaves the world: its splats are about to be freed, or to be shown in another element. */
   leave(): void {
     this.member?.remove();
     this.member = undefined;
@@ -379,7 +382,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.ownClock.empty();
     this.ownClock.stopWaits();
     this.dispatch(new Event('emptied'));
-    // What else is there is back, if it is: its own loss is told of by the scene that comes.
+    // The other sources are restored; the loss of this one is reported by the scene that replaces it.
     if (!this.#isOwn) this.contextChanged('contextrestored');
   }
 

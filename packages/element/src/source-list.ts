@@ -12,25 +12,25 @@ import type { LodSettings, Drawable } from './gpu/painter.js';
 import { Member } from './member.js';
 import type { EntryList, SourceEntry } from './source-entry.js';
 
-/** States from the one that says most of several entries on. */
+/** States by priority for the combined state of several entries. */
 const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
 
-/** What the list asks of its element, and what it tells it. */
+/** The interface of the element that the list uses. */
 export interface ListStage {
   readonly camera: Pick<CameraController, 'frame' | 'refine'>;
   readonly frame: ViewerFrame;
   requestFrame(): void;
   splatsChanged(): void;
   prepareFor(scene: LoadedGaussians): Promise<void>;
-  /** Draws what is in the world from now on. Fulfils with the first frame of it. */
+  /** Draws the world from now on. Fulfills with its first frame. */
   draw(scene: Drawable): Promise<void>;
-  /** Nothing is shown any more; the last image stays unless it is to be cleared. */
+  /** Stops drawing; the last image stays unless it is to be cleared. */
   stopDrawing(clear: boolean): void;
   warn(sentence: string): void;
   dispatch(event: Event): void;
 }
 
-/** All sources of an element, its own and then those of its children, and what holds for all of them together. */
+/** All sources of an element, its own first, then those of its children, and their shared state. */
 export class SourceList implements EntryList {
   /** All that is drawn. */
   readonly world = new World();
@@ -41,7 +41,7 @@ export class SourceList implements EntryList {
   });
   readonly #stage: ListStage;
   readonly #all: SourceEntry[];
-  /** They come one after the other, so that one that fails is known. */
+  /** Sources are shown one after the other, so that a failure can be attributed. */
   #arrivals: Promise<void> | undefined;
   #latest: SourceEntry | undefined;
   #isFramed = false;
@@ -54,7 +54,7 @@ export class SourceList implements EntryList {
     this.#all = [own];
   }
 
-  // Who is there.
+  // Membership.
 
   add(entry: SourceEntry): void {
     this.#all.push(entry);
@@ -85,11 +85,12 @@ export class SourceList implements EntryList {
     return this.members.length === 0;
   }
 
-  // Coming and going.
+  // Showing and hiding.
 
   /**
-   * Shows what an entry has loaded, once those before it are drawn. Fulfils when it is, or need not be any more; rejects with GaussianSplatError `out-of-memory/*`.
-   * @param enter puts it into the world
+   * Shows an entry's loaded scene after the earlier ones are drawn. Fulfills when it is shown or no longer needed;
+   * rejects with GaussianSplatError `out-of-memory/*`.
+   * @param enter adds it to the world
    */
   show(entry: SourceEntry, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void> {
     const show = async (): Promise<void> => {
@@ -115,7 +116,7 @@ export class SourceList implements EntryList {
     return shown;
   }
 
-  /** Something is shown no more: draws what is left, or nothing. */
+  /** Draws the remaining sources after one is hidden. */
   left(clear: boolean): void {
     this.#stage.splatsChanged();
     if (this.#isEmpty) {
@@ -125,7 +126,7 @@ export class SourceList implements EntryList {
     this.meshes.value?.forget();
   }
 
-  /** What came last was too much; whatever else it was, what is left is tried again. */
+  /** Removes the source that came last, and tries the remaining ones again. */
   fail(error: unknown): void {
     const entered = this.#all.filter(({ member }) => member !== undefined);
     const latest = entered.find((entry) => entry === this.#latest);
@@ -133,7 +134,7 @@ export class SourceList implements EntryList {
     (latest ?? (this.own.member ? this.own : (entered.at(-1) ?? this.own))).scene.fail(error);
   }
 
-  /** The camera sees all of it. */
+  /** Frames all sources. */
   frame(entrance: Entrance, entry?: SourceEntry): void {
     const { bounds } = this;
     if (entrance === 'again' || bounds === null) return;
@@ -143,13 +144,13 @@ export class SourceList implements EntryList {
     this.#isFramed = true;
   }
 
-  /** Other splats are drawn, or move for another time. */
+  /** The drawn splats or their duration have changed. */
   changed(): void {
     this.#setDuration();
     this.#stage.splatsChanged();
   }
 
-  /** One is shown, or cannot be. */
+  /** One source is shown or has failed. */
   settledOne(): void {
     this.changed();
     // The events of an element without a scene of its own are those of its children together.
@@ -161,7 +162,7 @@ export class SourceList implements EntryList {
     else if (this.error) this.own.tellFailed(this.error);
   }
 
-  /** Tells the page that a device was lost, or that all is back. */
+  /** Reports to the page that a device was lost, or that all sources are restored. */
   contextChanged(type: 'contextlost' | 'contextrestored', entry: SourceEntry): void {
     const before = this.#lost.size;
     if (type === 'contextlost') this.#lost.add(entry);
@@ -170,7 +171,7 @@ export class SourceList implements EntryList {
       this.#stage.dispatch(new Event(type));
   }
 
-  /** The triangles of a file that has splats, too: they come after these, and what is wrong with them leaves the splats visible. */
+  /** Meshes of a file that also has splats load after the splats; their failure leaves the splats visible. */
   async #addMeshes(entry: SourceEntry, scene: LoadedGaussians): Promise<void> {
     try {
       await (await this.meshes.get()).add(entry, scene);
@@ -184,7 +185,7 @@ export class SourceList implements EntryList {
     }
   }
 
-  // What holds for all.
+  // State of all sources together.
 
   get state(): SceneState {
     const { state } = this.own;
@@ -192,19 +193,19 @@ export class SourceList implements EntryList {
     return STATES.find((each) => this.#all.some((entry) => entry.state === each)) ?? state;
   }
 
-  /** Why nothing is shown. */
+  /** Reason that nothing is shown. */
   get error(): ElementError | null {
     const { error, state } = this.own;
     if (error || state !== 'empty' || this.state !== 'failed') return error;
     return this.#all.find((entry) => entry.error)?.error ?? null;
   }
 
-  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  /** Fulfills, and never rejects, when nothing is pending. */
   get settled(): Promise<unknown> {
     return Promise.all(this.#all.map(({ settled }) => settled));
   }
 
-  /** Share of the loading that is done, 0..1; null while it is not known. */
+  /** Loading progress, 0..1; null while unknown. */
   get progress(): number | null {
     const wanted = this.#all.filter(({ state }) => state !== 'empty' && state !== 'failed');
     const shares = wanted.map(({ state, progress }) => (state === 'ready' ? 1 : progress));
@@ -226,14 +227,14 @@ export class SourceList implements EntryList {
     return { detail: most(({ detail }) => detail), splatBudget: most(({ splatBudget }) => splatBudget) };
   }
 
-  /** Where all of it is, in the frame of the element's own scene; null while nothing is shown. */
+  /** Bounds of all sources in the frame of the element's own scene; null while nothing is shown. */
   get bounds(): SceneBounds | null {
     this.place();
     const bounds = boundsOfWorld(this.world);
     return bounds ? { ...bounds, up: this.own.member?.scene.bounds.up } : null;
   }
 
-  /** The same, measured anew where a generator may have moved it. */
+  /** The same, measured again for generators, which may have moved. */
   async readBounds(): Promise<SceneBounds | null> {
     await Promise.all(
       this.members.map(async (member) => {
@@ -244,7 +245,7 @@ export class SourceList implements EntryList {
     return this.bounds;
   }
 
-  /** What plays by itself. */
+  /** Clock of automatic motion. */
   get player(): MotionHost['player'] {
     const clocks = this.#all.flatMap(({ player }) => player ?? []);
     if (clocks.length === 0) return undefined;
@@ -263,7 +264,7 @@ export class SourceList implements EntryList {
       : [];
   }
 
-  // What all do.
+  // Operations on all sources.
 
   place(): void {
     for (const entry of this.#all) entry.place();
@@ -287,23 +288,23 @@ export class SourceList implements EntryList {
     for (const entry of this.#all) entry.reportMotionFrame(isWhole);
   }
 
-  /** They may be loaded, or play, now. */
+  /** Loads and plays the sources if that is allowed now. */
   request(): void {
     for (const entry of this.#all) entry.request();
   }
 
-  /** The element's clock goes as far as its own scene, or else as what follows it. */
+  /** The element's clock has the duration of its own scene, or else of the sources that follow it. */
   #setDuration(): void {
     const { own } = this;
     if (own.member === undefined && (own.state === 'waiting' || own.state === 'loading')) return;
-    // What has gone with a device comes back, and its time goes on.
+    // Sources that were lost with a device return, and their time continues.
     if (this.#lost.size > 0) return;
     const clock = own.ownClock;
     const couldPlay = clock.canPlay;
     const followed = this.#all.flatMap((entry) => (entry.owner.hasOwnClock ? [] : [entry.duration]));
     const moving = followed.filter((seconds) => !Number.isNaN(seconds));
     clock.setDuration(Number.isNaN(own.duration) && moving.length > 0 ? Math.max(...moving) : own.duration);
-    // What follows the clock may come when the poster has gone.
+    // Sources that follow the clock may start after the poster is dismissed.
     if (!couldPlay && clock.canPlay) own.startPlaying();
   }
 }

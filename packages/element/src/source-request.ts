@@ -1,14 +1,14 @@
-/** From what an element's attributes say to addresses and requests. */
+/** Addresses and requests from an element's attributes. */
 import { credentialsOf, type Attributes } from './attributes.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { Source } from './stage-host.js';
 
-/** A page's hand in every address; null or undefined for none. */
+/** The page's rewriting of every address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;
 
 /**
- * Addresses of what an attribute names: found once for each value that it is given, as `<img>` does. The address of the page may change
- * afterwards, and a page's signatures may be others each time.
+ * Address of a named resource, resolved once per attribute value, like that of `<img>`: the page's URL may change
+ * later, and signatures may differ each time.
  */
 class Named {
   #values: readonly (string | Blob)[] = [];
@@ -26,13 +26,13 @@ class Named {
   }
 }
 
-/** What the attributes of one element name. */
+/** Resolved addresses of one element. */
 export class Addresses {
   readonly #src = new Named();
   readonly #chain = new Named();
   readonly #postprocess = new Named();
 
-  /** The scene that is asked for; null for none. */
+  /** The requested scene; null for none. */
   request(
     { src, contract, chain }: Source,
     { crossorigin, quality, detail, renderer }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail' | 'renderer'>,
@@ -60,20 +60,20 @@ export class Addresses {
 /** A property may have been given a list of them. */
 const listed = (urls: string | null): readonly string[] => [urls].flat().join(' ').split(/\s+/).filter(Boolean);
 
-/** A file of another window, an iframe's for one, is none of this one's `Blob`s. */
+/** Also true for a file of another window, such as an iframe, which is no instance of this window's `Blob`. */
 const isFile = (source: unknown): source is Blob => 'arrayBuffer' in Object(source);
 
-/** Of files that were given in place of addresses. */
+/** Object URLs of files that were given instead of addresses. */
 const fileUrls = new WeakMap<Blob, string>();
 
-/** The same for the same file, with its name behind it: a `.splat` is known by nothing else. */
+/** Same URL for the same file, followed by its name: the extension is all that identifies a `.splat`. */
 function fileUrl(file: Blob): string {
   const url = fileUrls.get(file) ?? `${URL.createObjectURL(file)}#${encodeURIComponent((file as File).name ?? '')}`;
   fileUrls.set(file, url);
   return url;
 }
 
-/** The worker has a base URL of its own, so it is given whole ones. What is no URL stays as it is, and fails there. */
+/** Absolute, because the worker has a base URL of its own. A string that is no URL stays as it is and fails there. */
 const absolute = (url: string): string =>
   URL.canParse(url, document.baseURI) ? new URL(url, document.baseURI).href : url;
 
@@ -81,10 +81,10 @@ function addressOf(source: string | Blob, modifier: UrlModifier): string {
   if (isFile(source)) return fileUrl(source);
   const url = absolute(source);
   try {
-    // Whatever it gives: an element that asks for a promise says so.
+    // Converts any result to a string: if the element is given a promise, its error shows `[object Promise]`.
     return absolute(String(modifier?.(url) ?? url));
   } catch (error) {
-    // The page's own fault must not end the element's life, as that of a listener does not.
+    // An error of the page's function must not break the element; it is reported like that of an event listener.
     reportError(error);
     return url;
   }

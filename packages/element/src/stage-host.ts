@@ -5,13 +5,13 @@ import type { LiveState } from './live/live-model.js';
 import type { SceneLimits } from './loading/protocol.js';
 import type { SceneLoader } from './loading/scene-loader.js';
 
-/** What elements share. */
+/** Services shared by all elements of a page. */
 export interface Services {
   readonly sharedDevice: SharedDevice;
   readonly sceneLoader: SceneLoader;
   /** How long a removed element keeps its scene, ms. */
   readonly releaseDelay: number;
-  /** Bytes of GPU memory that one scene may take; null for what suits the device. */
+  /** Maximum GPU memory of one scene, bytes; null for a limit that suits the device. */
   readonly memoryBudget: number | null;
   readonly sceneLimits: SceneLimits;
   /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
@@ -20,7 +20,7 @@ export interface Services {
   readonly urlModifier: ((url: string) => string) | null;
 }
 
-/** What is to be shown, as the element's attributes have it. */
+/** The requested source according to the element's attributes. */
 export interface Source {
   readonly src: string | Blob | null;
   readonly contract: unknown;
@@ -29,7 +29,7 @@ export interface Source {
   readonly postprocess: string | null;
 }
 
-/** What the stage knows of its element, as of now: its attributes, and the parts of its shadow tree once they are rendered. */
+/** The current attributes of the element, and the parts of its shadow tree once rendered. */
 export interface StageHost {
   readonly attributes: Attributes;
   readonly services: Services;

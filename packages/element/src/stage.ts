@@ -39,8 +39,8 @@ import type { TourHost } from './views/tour.js';
 import type { SpokenStrings } from './words.js';
 
 /**
- * All that goes on behind the element's attributes and markup: what is shown, camera, size, sight and input, and who of them
- * tells whom. It is the host of the controllers of the picture: each of them says in an interface of its own what it asks of it.
+ * Connects the source list, camera, size, visibility and input of an element behind its attributes and markup. It
+ * implements the host interface of each controller.
  */
 export class Stage
   implements SourceOwner, ViewHost, RevealHost, HotspotHost, InputHost, BehaviourHost, QueryHost, TourHost
@@ -61,18 +61,18 @@ export class Stage
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
 
-  /** What is in the markup has changed. */
+  /** The state shown in the markup has changed. */
   readonly #update = (): void => this.element.requestUpdate();
 
-  // Few pages need these.
+  // Loaded on demand: few pages need these.
 
-  /** What shows the element's children. */
+  /** Shows the element's children. */
   readonly #composition = new Lazy('the code that shows several scenes', async () => {
     const { compose } = await import('./composition/compose.js');
     compose(this);
     return true;
   });
-  /** What flies from view to view. */
+  /** Flies between views. */
   readonly tour = new Lazy(
     'the code for views',
     async () => {
@@ -81,7 +81,7 @@ export class Stage
     },
     this.#update,
   );
-  /** What walks on the floor. */
+  /** Walks on the floor. */
   readonly walk = new Lazy(
     'the code for walking',
     async () => {
@@ -98,22 +98,22 @@ export class Stage
     async () => new (await import('./xr/extras.js')).Extras(this.element, this),
     this.#update,
   );
-  /** An `<audio>` or `<video>` of the page that is heard with a scene that moves. */
+  /** An `<audio>` or `<video>` element of the page that plays along with a moving scene. */
   readonly #sound = new Lazy('the code for sound', async () => {
     const { Sound } = await import('./live/sound.js');
     const sound = new Sound(this.element as unknown as SoundHost);
     sound.update();
     return sound;
   });
-  /** Cuts, how the scene appears, the page's own shader. */
+  /** Cuts, the reveal effect, and the page's own shader. */
   readonly effects = new Lazy(
     'the code of effects',
     async () => new (await import('./effects/effects.js')).Effects(this as unknown as EffectsHost),
     this.#update,
   );
-  /** A session shows the scene: the page does not. */
+  /** A session shows the scene, so the page does not draw it. */
   isImmersed = false;
-  /** Puts the frame on paper; fetched after the first frame. */
+  /** Draws the frame for printing; fetched after the first frame. */
   readonly #print = new Lazy('the code for printing', async () => {
     const { PrintController } = await import('./controllers/print-controller.js');
     return new PrintController(this.element, () => this.drawNow());
@@ -129,7 +129,7 @@ export class Stage
     },
     this.#update,
   );
-  /** What listens to mouse, touch and keys. */
+  /** Listens to mouse, touch and keyboard. */
   readonly #hands = new Lazy(
     'the code for mouse, touch and keys',
     async () => {
@@ -141,7 +141,7 @@ export class Stage
     },
     this.#update,
   );
-  /** Present while there is one who listens. */
+  /** Set while input is enabled. */
   handsView: TemplateModel['handsView'];
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: StageHost) {
@@ -165,7 +165,7 @@ export class Stage
         this.#children ??= new MutationObserver(() => this.#lookAtChildren());
         this.#children.observe(element, { childList: true, subtree: true, attributeFilter: ['slot', 'data-orbit'] });
         this.#lookAtChildren();
-        // Put back after a while, an eager element loads again though nothing has come into sight.
+        // An eager element that is inserted again after a while reloads even if it is not in view.
         this.sources.request();
       },
       hostUpdated: () => this.#updated(),
@@ -176,7 +176,7 @@ export class Stage
     });
   }
 
-  // What the page says, as of now.
+  // Current attributes of the page.
 
   get attributes(): Attributes {
     return this.#host.attributes;
@@ -235,7 +235,7 @@ export class Stage
     this.element.dispatchEvent(event);
   }
 
-  // What scripts ask.
+  // Interface of scripts.
 
   /** The clock of the element. */
   get playback(): PlaybackController {
@@ -246,19 +246,19 @@ export class Stage
     return this.sources.own.live;
   }
 
-  /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
+  /** Draws a frame now and returns its canvas, to be read within the same task; null if there is nothing to draw. */
   drawNow(...picture: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
     return this.sources.own.scene.isPreview ? null : this.view.drawNow(...picture);
   }
 
-  /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
+  /** Frames the scene again, as after loading; the scene of a generator is measured first. */
   async updateFraming(): Promise<void> {
     const { scene } = this.sources.own.scene;
     const bounds = await this.sources.readBounds();
     if (bounds && this.sources.own.scene.scene === scene) this.camera.frame(bounds);
   }
 
-  /** What is known of what is on show; null where there is nothing. */
+  /** Statistics of the displayed scene; null if there is none. */
   get stats(): SceneStats | null {
     const { shown, isPreview, levels, stats: parts } = this.sources;
     if (shown.length === 0) return null;
@@ -274,7 +274,7 @@ export class Stage
     });
   }
 
-  /** Asks the GPU for the counts of the picture on show. */
+  /** Reads the counts of the current image back from the GPU. */
   async updateStats(): Promise<SceneStats | null> {
     const { painter } = this.view;
     const camera = this.drawnFrom;
@@ -283,31 +283,31 @@ export class Stage
       const counts = await painter.readCounts(camera);
       if (this.view.painter === painter) this.#counts = counts;
     } catch (error) {
-      // What was asked for is gone; what there is now is known without it.
+      // The renderer was replaced meanwhile; the other statistics do not need it.
       if (!(await isGone(painter))) throw error;
     }
     return this.stats;
   }
 
-  /** What the page may set of the models on show. */
+  /** Inputs of the displayed models that the page may set. */
   get inputs(): readonly GeneratorInput[] {
     return [...this.sources.own.inputs, ...(this.view.painter?.filter?.inputs ?? [])];
   }
 
-  /** Puts the clock of a scene to a time: the one on show, or the next if the page asks for another. */
+  /** Seeks the clock of the displayed scene, or of the next one if the page requests another. */
   seek(seconds: number): void {
     if (this.sources.own.isLeaving) this.playback.startNextAt(seconds);
     else this.playback.currentTime = seconds;
   }
 
-  /** Somebody wants the time to run: the poster gives way, and a scene out of sight is loaded. */
+  /** Playback is requested: dismisses the poster and loads a scene that is out of view. */
   prepareToPlay(): void {
     this.sources.own.needNow();
     if (!this.reveal.mayReveal) this.reveal.dismiss();
     this.element.requestUpdate();
   }
 
-  /** The document that the element comes from has no window any more. */
+  /** The element's earlier document no longer has a window. */
   leaveWindowless(): void {
     this.view.renewCanvas();
   }
@@ -318,13 +318,13 @@ export class Stage
     return positionFromPoint(this, clientX, clientY);
   }
 
-  /** Fulfils, and never rejects, when nothing is left to wait for, code for attributes and children included. */
+  /** Fulfills, and never rejects, when nothing is pending, including code for attributes and children. */
   get settled(): Promise<unknown> {
     const code = [this.#print, this.#composition, this.effects, this.labels, this.#hands].map(({ settled }) => settled);
     return Promise.all(code).then(() => this.sources.settled);
   }
 
-  // What the controllers ask.
+  // Interfaces of the controllers.
 
   get isVisible(): boolean {
     return this.#visibility.isVisible && !this.isImmersed;
@@ -335,22 +335,22 @@ export class Stage
     return !this.#visibility.isKnownHidden;
   }
 
-  /** Somebody would see the scene. */
+  /** The scene would be visible. */
   get isInSight(): boolean {
     return this.isVisible && this.reveal.mayReveal;
   }
 
-  /** The scene is on show, in sight, and no poster covers it. */
+  /** The scene is shown, in view, and not covered by a poster. */
   get isOnShow(): boolean {
     return !this.reveal.isCovered && this.isVisible;
   }
 
-  /** What moves by itself may. */
+  /** Automatic motion is allowed. */
   get mayMove(): boolean {
     return this.isOnShow && !prefersReducedMotion() && !this.behaviours.motion.value?.isHeld;
   }
 
-  /** Fingers have moved the camera, and have no Home key. */
+  /** A touch user has moved the camera and has no Home key. */
   get offersReset(): boolean {
     return this.input.enabled && this.isOnShow && this.#hands.value?.isTouch === true && this.camera.isTouched;
   }
@@ -375,7 +375,7 @@ export class Stage
     return this.sources.levels;
   }
 
-  /** The camera before the picture has a size. */
+  /** The camera before the image has a size. */
   get firstView(): Camera {
     return this.camera.view(...FIRST_SIZE);
   }
@@ -403,15 +403,15 @@ export class Stage
     return this.sources.meshes.value?.draw(frame) ?? {};
   }
 
-  /** Looks into the last frame. Rejects if it is gone. */
+  /** Reads surface positions of the last frame. Rejects if the frame is gone. */
   async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
     const answers = (await this.view.painter?.probe(points)) ?? [];
     return this.sources.meshes.value?.probe(points, answers) ?? answers;
   }
 
-  // What they tell.
+  // Notifications of the controllers.
 
-  /** Asks for a frame: a changed attribute may concern the picture, for example its pixel ratio. */
+  /** Requests a frame: a changed attribute may affect the image, such as its pixel ratio. */
   requestFrame(): void {
     this.view.requestFrame();
   }
@@ -434,7 +434,7 @@ export class Stage
     this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
   }
 
-  /** Other splats are drawn than before. */
+  /** The set of drawn splats has changed. */
   splatsChanged(): void {
     this.#counts = undefined;
     this.view.requestFrame();
@@ -449,13 +449,13 @@ export class Stage
     this.sources.fail(error);
   }
 
-  /** What a scene needs, to be shown as the page wants it from its first frame on. */
+  /** Prepares effects and settings of a scene before its first frame. */
   async prepareFor(scene: LoadedGaussians): Promise<void> {
     await this.effects.settled;
     await this.effects.value?.prepareFor(scene);
   }
 
-  /** Draws what is in the world from now on. Fulfils with the first frame of it. */
+  /** Draws the world from now on. Fulfills with its first frame. */
   draw(scene: Drawable): Promise<void> {
     this.#print.get().catch(this.#warnOf);
     const drawn = this.view.show(scene);
@@ -463,7 +463,7 @@ export class Stage
     return drawn;
   }
 
-  /** Nothing is shown any more; the last picture stays unless it is to be cleared. */
+  /** Stops drawing; the last image stays unless it is to be cleared. */
   stopDrawing(clear: boolean): void {
     this.live.attachPost(null);
     if (!clear) return this.view.pause();
@@ -482,9 +482,9 @@ export class Stage
     return this.behaviours.act(action);
   }
 
-  /** Beside the scene is where somebody has lost it. */
+  /** A pick beside the scene means that the visitor has lost it. */
   pick(clientX: number, clientY: number): void {
-    // A walker's click means that it goes there.
+    // A click while walking selects a destination.
     if (this.attributes.navigation === 'walk') return;
     this.positionFromPoint(clientX, clientY).then((point) => {
       if (point === null) this.act({ type: 'reset' });
@@ -492,7 +492,7 @@ export class Stage
     }, this.#warnOf);
   }
 
-  /** The space bar, for all that moves. A player's controls around the element have keys of their own. */
+  /** Toggles all motion, for the space bar. A player's controls around the element have keys of their own. */
   toggleMotion(): boolean {
     if (this.behaviours.motion.value?.toggle()) return true;
     if (!this.playback.canPlay || this.element.slot === 'media') return false;
@@ -503,7 +503,7 @@ export class Stage
 
   readonly #warnOf = (error: Error): void => this.warn(error.message);
 
-  /** Children bring what they need: few pages have any. */
+  /** Loads the code for children on demand: few pages have any. */
   #lookAtChildren(): void {
     const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
     if (has('splat-scene,splat-mesh')) this.#composition.want(this.#warnOf);
@@ -538,7 +538,7 @@ export class Stage
   }
 
   #onSize(): void {
-    // Without a size, in a closed tab for one, there is no shape to follow.
+    // Without a size, for example in a background tab, the aspect ratio stays.
     if (!this.size.isEmpty) this.camera.setAspect(this.size.aspect);
     this.view.requestFrame();
   }
@@ -546,5 +546,8 @@ export class Stage
 
 const queries = new Lazy('the code that finds points of the scene', () => import('./position-from-point.js'));
 
-/** Width and height, in pixels, that a generator hears of before the picture has a size: those of an element without style. */
+/**
+ * Width and height, in pixels, passed to a generator before the image has a size: the default size of an element
+ * without style.
+ */
 const FIRST_SIZE = [300, 150] as const;

@@ -7,46 +7,55 @@ import type { ElementError } from './errors.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import type { ReadCounts } from './gpu/painter.js';
 
-/** What is modelled, drawn, and seen of a scene, what it takes, and why. */
+/** Counts of modeled, drawn and visible splats of a scene, its memory, and the reasons for reductions. */
 export interface SceneStats {
   /** What draws. */
   readonly renderer: 'webgpu' | 'webgl';
   /** Splats that the file has, or a generator writes at most. */
   readonly modelled: number;
-  /** What is shown is a part of a scene that is still loading; all counts are those of the part. */
+  /** The preview of a scene that is still loading is shown; all counts are those of the preview. */
   readonly isPreview: boolean;
-  /** Of these, left out because a value was not usable. */
+  /** Splats of the file that were left out because a value was not usable. */
   readonly dropped: number;
-  /** Splats on the GPU; of a sequence those of its present frame, of a streamed scene those for which there is room. */
+  /** Splats on the GPU: the current frame of a sequence; the capacity of a streamed scene. */
   readonly splats: number;
-  /** Splats on the GPU, those of levels of detail included; of a streamed scene those for which there is room. */
+  /** Splats on the GPU including levels of detail; the capacity of a streamed scene. */
   readonly inMemory: number;
   /**
-   * Levels of detail: splats that were merged for them and are on the GPU besides the scene's own, and pixels by which frames at rest may be off. Of a streamed
-   * scene, whose levels are its own, 0 splats.
+   * Levels of detail: merged splats on the GPU besides the scene's own, and the allowed error of frames at rest in
+   * pixels. 0 splats for a streamed scene, which contains its own levels.
    */
   readonly detail: { readonly splats: number; readonly pixels: number };
-  /** Splats that were drawn, as of the last `updateStats()`: in front of the camera, opaque enough, and over a pixel. null before. */
+  /**
+   * Splats that the last `updateStats()` found drawn: in front of the camera, opaque enough, and covering a pixel. null
+   * before.
+   */
   readonly drawn: number | null;
-  /** Splats that some pixel shows by half a step of 255 or more, likewise. */
+  /** Splats that change some pixel by half a step of 255 or more, at the last `updateStats()`. null before. */
   readonly contributed: number | null;
   /** Bytes of GPU memory: of the splats, and of what frames are drawn with. */
   readonly bytes: { readonly scene: number; readonly frames: number };
   /** The attribute `quality`. */
   readonly quality: QualityChoice;
-  /** What frames at rest and in motion are drawn with. */
+  /** Settings of frames at rest and in motion. */
   readonly dynamicQuality: DynamicQualityReport;
-  /** The direction of the scene's frame that its file says points up, of length 1; null where it says nothing. Of several scenes that of the first. */
+  /**
+   * Up direction in the scene's frame according to its file, of length 1; null if the file has none. The first scene
+   * counts.
+   */
   readonly up: Vector3 | null;
-  /** What of the files is not drawn, or may mean something else than what is drawn, for readers; the console has it, too. */
+  /**
+   * Features of the files that are not drawn or may be drawn differently than intended, in English; also in the
+   * console.
+   */
   readonly warnings: readonly string[];
-  /** The element's own scene, then its children, each by itself; empty for an element without children. */
+  /** The element's own scene, then its children, separately; empty for an element without children. */
   readonly scenes: readonly PartStats[];
-  /** All that is done to the scene for the sake of time or memory, for readers; empty where nothing is. */
+  /** Reductions of the scene to save time or memory, in English; empty without reductions. */
   readonly why: readonly string[];
 }
 
-/** What a child of the element shows, and what it takes. */
+/** State and memory of one child of the element. */
 export interface PartStats {
   /** The child; the element itself for its own scene. */
   readonly element: HTMLElement;
@@ -62,7 +71,7 @@ export interface PartStats {
   readonly bytes: number;
 }
 
-/** What a scene takes. */
+/** Memory and counts of a scene. */
 export const costOf = (
   scene: LoadedGaussians | null,
 ): Pick<PartStats, 'splats' | 'triangles' | 'dropped' | 'bytes'> => ({
@@ -72,7 +81,7 @@ export const costOf = (
   bytes: scene ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0) : 0,
 });
 
-/** What is known besides the scene. */
+/** Information that does not come from the scene. */
 export interface StatsContext {
   readonly quality: QualityChoice;
   readonly dynamicQuality: DynamicQualityReport;
@@ -82,12 +91,12 @@ export interface StatsContext {
   readonly frameBytes: number;
   /** See `Painter.pixelShare`. */
   readonly pixelShare?: number | undefined;
-  /** Pixels by which pictures at rest may be off. */
+  /** Allowed error of images at rest, pixels. */
   readonly pixels: number | undefined;
   readonly parts: readonly PartStats[];
 }
 
-/** Puts together what is known without asking the GPU. */
+/** Statistics that need no readback from the GPU. */
 export function statsOf(
   scenes: readonly LoadedGaussians[],
   { quality, dynamicQuality, counts, isPreview, frameBytes, pixelShare = 1, pixels = 0, parts }: StatsContext,
@@ -145,7 +154,7 @@ function whyDropped(dropped: number): string[] {
 }
 
 function whyDetail(quality: QualityChoice, { splats, pixels }: SceneStats['detail']): string[] {
-  // With a chosen quality they are drawn only where the page allows for it.
+  // Fixed qualities use them only if the page allows it.
   if (splats === 0 || (pixels === 0 && quality !== 'auto')) return [];
   const rest = pixels > 0 ? `, by ${pixels} px at most` : ' while they move';
   return [`${splats} merged splats stand for what is too small to see: frames may be off for it${rest}.`];

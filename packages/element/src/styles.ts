@@ -3,8 +3,8 @@ import { css, type CSSResult } from 'lit';
 const stylesOf = new WeakMap<ShadowRoot, CSSResult[]>();
 
 /**
- * Adds styles to a shadow tree, in style sheets of its own document: those of other documents are refused there. Without any, makes those anew that it has, for
- * a document that it has come to. A document without a window shows nothing, and gets none.
+ * Adds styles to a shadow tree, in style sheets of its own document, because documents reject those of others. Without
+ * arguments, recreates its style sheets for a new document. A document without a window shows nothing and gets none.
  */
 export function adoptStyles(root: ShadowRoot, ...more: CSSResult[]): void {
   const all = [...(stylesOf.get(root) ?? [styles]), ...more];
@@ -19,8 +19,8 @@ export function adoptStyles(root: ShadowRoot, ...more: CSSResult[]): void {
 }
 
 /**
- * Size and containment as an image has them; everything that a page may want to change is a custom property or a part. `hidden` counts whatever
- * `display` a page gives the tag for the time before the script.
+ * Size and containment match those of an image; everything that a page may want to change is a custom property or a
+ * part. `hidden` wins over any `display` that a page sets for the time before the script.
  */
 export const styles = css`
   :host {

@@ -4,35 +4,35 @@ import { languageOf, word, type SpokenStrings } from './words.js';
 
 /** Everything that the shadow tree shows. */
 export interface TemplateModel {
-  /** Text alternative; empty for a decorative scene, null where the page gives none. */
+  /** Text alternative; empty for a decorative scene, null if the page gives none. */
   readonly label: string | null;
-  /** People may move the camera. */
+  /** Visitors may move the camera. */
   readonly canMove: boolean;
   readonly navigation: 'orbit' | 'fly' | 'walk';
-  /** Help for the keys of walking, once a floor is looked for. */
+  /** Help for the keys of walking, once a floor is requested. */
   readonly walkKeys: string | undefined;
   readonly poster: string | null;
   readonly posterLoading: 'lazy' | 'eager';
   readonly showPoster: boolean;
-  /** The poster waits for a person: what dismisses it. */
+  /** Dismisses a poster that waits for the visitor. */
   readonly onReveal: (() => void) | null;
   readonly isLoading: boolean;
-  /** Share of the loading that is done, 0..1; null while it is not known. */
+  /** Loading progress, 0..1; null while unknown. */
   readonly progress: number | null;
   readonly error: ElementError | null;
-  /** There is a poster, of the attribute or of the page's own. */
+  /** There is a poster, from the attribute or the slot. */
   readonly hasPoster: boolean;
-  /** How people learn that they can move the scene. */
+  /** Hint that the scene can be moved. */
   readonly prompt: 'none' | 'basic' | 'wiggle';
-  /** Brings the camera back; null where no button is offered for it. */
+  /** Resets the camera; null if no button is offered. */
   readonly onReset: (() => void) | null;
   /** Words of the page in place of the English ones. */
   readonly strings: SpokenStrings;
-  /** What screen readers are told: of an error, else of the camera. */
+  /** Text for screen readers: the error, or else the camera. */
   readonly spoken: string;
-  /** What people see who may move the camera, once its code is there. */
+  /** Hints for visitors who may move the camera, after its code has loaded. */
   readonly handsView: ((model: TemplateModel) => TemplateResult) | undefined;
-  /** The button for all that moves by itself; undefined where nothing does. */
+  /** The button that pauses all automatic motion; undefined without any. */
   readonly motionView: TemplateResult | undefined;
   /** Names of the slots of the hotspots. */
   readonly hotspots: readonly string[];
@@ -49,10 +49,10 @@ export function template(model: TemplateModel): TemplateResult {
   `;
 }
 
-/** The picture. One canvas for life, whatever the attributes: a context cannot move from one to another. */
+/** The image. The canvas stays the same for all attributes, because a context cannot move between canvases. */
 function view({ label, canMove: controls, onReveal, strings }: TemplateModel): TemplateResult {
   const role = controls ? 'application' : label === '' ? 'presentation' : 'img';
-  // Behind a poster that waits for a person there is nothing to see or to do yet.
+  // The scene behind a poster that waits for the visitor is neither visible nor interactive.
   const isWaiting = onReveal !== null;
   return html`
     <div
@@ -70,7 +70,7 @@ function view({ label, canMove: controls, onReveal, strings }: TemplateModel): T
   `;
 }
 
-/** A box for each name, in their order; where it lies is up to the controller of the hotspots. Under a poster nobody reaches them. */
+/** A box per name, in order; the hotspot controller positions it. Boxes under a poster are unreachable. */
 function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
   return html`<div id="hotspots" class="layer ${showPoster ? 'gone' : ''}">
     ${hotspots.map(
@@ -83,8 +83,8 @@ function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
 }
 
 /**
- * The poster is scenery of the same scene, so it needs no text of its own. One that waits for a person is a button around the image, the page's
- * own included, with a sign that there is something to start.
+ * The poster depicts the same scene, so it needs no text of its own. One that waits for the visitor is a button around
+ * the image, including a slotted one, with a play symbol.
  */
 function poster(model: TemplateModel): TemplateResult {
   const { poster, posterLoading, showPoster, onReveal } = model;
@@ -133,9 +133,9 @@ function progressBar({ progress, strings }: TemplateModel): TemplateResult {
 }
 
 /**
- * What went wrong: a sentence for visitors, and the details for those who made the page. Screen readers announce only what comes into a
- * region that was there before, so the sentence is told in that, too. Where there is no WebGPU visitors can mend nothing: they get the poster alone, or the
- * sentence at the edge.
+ * The error: a sentence for visitors, and details for the page's author. Screen readers announce only changes of a
+ * region that already exists, so the sentence is repeated there. Without WebGPU the visitor can do nothing, so only the
+ * poster is shown, or the sentence at the edge.
  */
 function message({ hasPoster, strings }: TemplateModel, error: ElementError): TemplateResult {
   const lang = languageOf(strings) ?? nothing;
@@ -144,7 +144,7 @@ function message({ hasPoster, strings }: TemplateModel, error: ElementError): Te
     return html`<div class="layer message">
       <slot name="fallback">${hasPoster ? nothing : html`<div part="fallback">${text}</div>`}</slot>
     </div>`;
-  // The details are for the person who made the page, and always English.
+  // The details are for the page's author, and always in English.
   return html`<div class="layer message">
     <slot name="error"
       ><div part="error">

@@ -3,8 +3,8 @@ export class SceneTimeRanges {
   readonly #spans: readonly (readonly [start: number, end: number])[];
 
   /**
-   * @param end seconds; NaN, 0 and Infinity make an empty list, others one span from 0 on
-   * @param spans in place of that
+   * @param end seconds; NaN, 0 and Infinity make an empty list, others one span from 0
+   * @param spans replaces that span
    */
   constructor(
     end: number,
@@ -17,7 +17,7 @@ export class SceneTimeRanges {
     return this.#spans.length;
   }
 
-  /** Seconds. Throws an `IndexSizeError` for a span that is not there. */
+  /** Seconds. Throws an `IndexSizeError` for an index out of range. */
   start(index: number): number {
     return this.#at(index)[0];
   }

@@ -12,16 +12,16 @@ export interface ImageOptions {
   readonly mimeType?: string;
   /** 0..1, for formats that lose some. */
   readonly qualityArgument?: number;
-  /** Pixels. Default: as large as the element is drawn; one of the two alone keeps its shape. */
+  /** Pixels. Default: the drawn size of the element; one of the two alone keeps the aspect ratio. */
   readonly width?: number;
   readonly height?: number;
-  /** A CSS colour behind the scene. Default: transparent. */
+  /** CSS color behind the scene. Default: transparent. */
   readonly background?: string;
 }
 
-/** What scripts ask of the picture: its poster, its camera, what lies under a point of it, and the picture itself. */
+/** Poster, camera, surface positions, and images for scripts. */
 export abstract class ViewingMethods extends MediaProperties {
-  /** Attributes count at once for those who call a method right after setting one. */
+  /** Attributes apply at once for code that calls a method right after setting one. */
   protected abstract applyAttributes(): void;
 
   /** True while the poster does not cover the scene. */
@@ -29,7 +29,7 @@ export abstract class ViewingMethods extends MediaProperties {
     return !this.stage.reveal.isCovered;
   }
 
-  /** Lets the scene be seen as soon as it can be, and a lazy one be loaded: what `reveal="manual"` waits for. */
+  /** Shows the scene as soon as possible, and loads a lazy one: `reveal="manual"` waits for this call. */
   dismissPoster(): void {
     this.stage.reveal.dismiss();
   }
@@ -39,100 +39,103 @@ export abstract class ViewingMethods extends MediaProperties {
     this.stage.reveal.cover();
   }
 
-  /** Where the camera is now; as a string, a value for `camera-orbit`. */
+  /** The current position of the camera; as a string, a value for `camera-orbit`. */
   getCameraOrbit(): CameraOrbit {
     return this.stage.camera.orbit;
   }
 
-  /** What the camera looks at now; as a string, a value for `camera-target`. */
+  /** The point that the camera looks at; as a string, a value for `camera-target`. */
   getCameraTarget(): CameraTarget {
     return this.stage.camera.target;
   }
 
-  /** Vertical field of view now; as a string, a value for `field-of-view`. */
+  /** The current vertical field of view; as a string, a value for `field-of-view`. */
   getFieldOfView(): FieldOfView {
     return this.stage.camera.fieldOfView;
   }
 
-  /** Ends the camera's motion where it was going. */
+  /** Jumps to the goal of the camera's current motion. */
   jumpCameraToGoal(): void {
     this.applyAttributes();
     this.stage.camera.jumpToGoal();
   }
 
-  /** Brings the camera back to where the attributes put it. */
+  /** Resets the camera to the pose of the attributes. */
   resetCamera(): void {
     this.applyAttributes();
     this.stage.camera.reset('none');
   }
 
   /**
-   * Flies to a view: one of the page's list by its name or its place in it (from 0), or any other. Waits for the scene. Visitors who ask for less motion are there at once.
-   * @returns fulfils at the end: true on arrival, false where a visitor, an attribute or another flight has taken the camera. Rejects with
-   * `argument/camera` for a view that is malformed or has no such name.
+   * Flies to a view: a name or index (from 0) of the page's list, or any other view. Waits for the scene. Visitors who
+   * prefer reduced motion jump there at once.
+   * @returns fulfills at the end: true on arrival, false if a visitor, an attribute or another flight took over the
+   * camera. Rejects with `argument/camera` for a malformed view or an unknown name.
    */
   async flyTo(view: CameraView | string | number, options?: FlightOptions): Promise<boolean> {
     return (await this.stage.tour.get()).flyTo(view, options);
   }
 
-  /** Flies to the next view of the list, after the last to the first. As {@link flyTo}. */
+  /** Flies to the next view of the list, and from the last to the first. See {@link flyTo}. */
   async nextView(options?: FlightOptions): Promise<boolean> {
     return (await this.stage.tour.get()).step(1, options);
   }
 
-  /** Flies to the view before. As {@link flyTo}. */
+  /** Flies to the previous view of the list. See {@link flyTo}. */
   async previousView(options?: FlightOptions): Promise<boolean> {
     return (await this.stage.tour.get()).step(-1, options);
   }
 
-  /** Flies along all views of the list on one smooth path, or along the keyframes that its file has. As {@link flyTo}. */
+  /** Flies through all views of the list on one smooth path, or along the keyframes of its file. See {@link flyTo}. */
   async flyAlong(options?: PathOptions): Promise<boolean> {
     return (await this.stage.tour.get()).flyAlong(options);
   }
 
   /**
-   * Puts the camera on that path, at once: for scenes that follow the page's scrolling.
+   * Puts the camera on that path at once, for scenes that follow the page's scrolling.
    * @param share 0..1, from the first view to the last
    */
   async showAlong(share: number): Promise<void> {
     return (await this.stage.tour.get()).showAlong(share);
   }
 
-  /** Lets the interaction prompt come again, as if no visitor had touched the scene. */
+  /** Shows the interaction prompt again, as if no visitor had touched the scene. */
   resetInteractionPrompt(): void {
     this.stage.behaviours.prompt?.reset();
   }
 
-  /** Frames the scene as if it had just been loaded: for generators whose scene has grown or gone elsewhere. */
+  /** Frames the scene as after loading, for generators whose scene has grown or moved. */
   async updateFraming(): Promise<void> {
     this.applyAttributes();
     await this.stage.updateFraming();
   }
 
-  /** Box around nearly all of the scene, in metres of viewer space; null while none is shown. */
+  /** Box around nearly all of the scene, in meters of viewer space; null while none is shown. */
   getBoundingBox(): SceneBox | null {
     return boxOf({ camera: this.stage.camera, bounds: this.stage.sources.bounds });
   }
 
   /**
-   * The visible surface of the scene under a point of the page: what `data-position` and `camera-target` take. Asks the GPU, beside the
-   * frames. `uncertainty` of the point says how far the surface spreads along the line of sight, `element`, `splat`, `mesh` and `material` what was met.
-   * @param clientX CSS pixels, as of a MouseEvent.
-   * @returns null beside the scene, and where it is more transparent than not.
+   * The visible surface of the scene under a point of the page, in the form of `data-position` and `camera-target`.
+   * Reads back from the GPU asynchronously. `uncertainty` of the point is the spread of the surface along the line of
+   * sight; `element`, `splat`, `mesh` and `material` identify the hit.
+   * @param clientX CSS pixels, like that of a MouseEvent.
+   * @returns null outside the scene, and on parts less than half opaque.
    */
   positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
     return this.stage.positionFromPoint(clientX, clientY);
   }
 
-  /** Where the hotspot of a slot is now, for example `hotspot-door`; null if there is none with a position. */
+  /** The current position of the hotspot in a slot, for example `hotspot-door`; null if there is none with a position. */
   queryHotspot(name: string): HotspotPlace | null {
     return this.stage.labels.value?.query(name) ?? null;
   }
 
   /**
-   * The image as it is on the screen now, with the CSS filters of the element, drawn anew. A colour that exceeds its alpha has no place in a transparent image: give `background` where the scene has such.
-   * @returns rejects with an `InvalidStateError` where no scene is shown, or the element has no size; with a `RangeError` for a size that the GPU
-   * cannot draw, and a `TypeError` for a background that is no colour.
+   * The current image of the screen, drawn again, with the CSS filters of the element. A transparent image cannot hold
+   * colors that exceed their alpha: set `background` if the scene has such.
+   * @returns rejects with an `InvalidStateError` if no scene is shown or the element has no size, with a `RangeError`
+   * for a size that the GPU cannot draw, and with a `TypeError` for an invalid background color.
    */
   async toBlob(options: ImageOptions = {}): Promise<Blob> {
     const { takePicture } = await loadModule('the code for images', () => import('./picture.js'));
@@ -140,7 +143,10 @@ export abstract class ViewingMethods extends MediaProperties {
     return takePicture(this.stage, options);
   }
 
-  /** The same as a `data:` URL, at once and without CSS filters. Throws an `InvalidStateError` where no scene is shown, or the element has no size. */
+  /**
+   * Synchronous form of {@link toBlob} as a `data:` URL, without CSS filters. Throws an `InvalidStateError` if no scene
+   * is shown or the element has no size.
+   */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
     this.applyAttributes();
     const canvas = this.stage.drawNow();

@@ -24,7 +24,7 @@ type Listeners<Events> = {
   [Type in string & keyof Events as `on${ListenerName<Type>}`]?: (event: Events[Type]) => void;
 };
 
-/** What Vue looks at in a component, for a tag of the platform. */
+/** The component type that Vue expects for a native tag. */
 type CustomElement<E, Settable, Events> = new () => E & {
   /** @deprecated Only for the types of templates. */
   readonly $props: Omit<HTMLAttributes, keyof Listeners<Events> | keyof Settable> &

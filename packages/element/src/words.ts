@@ -3,7 +3,10 @@ import type { ViewName } from './camera/spoken.js';
 import type { ElementErrorCode } from './errors.js';
 import type { PANEL_WORDS } from './live/controls-panel.js';
 
-/** What the element says apart from the camera's places, in English; `…` stands for the scene's text alternative. The keys are those of `a11y`, too. */
+/**
+ * Texts of the element except those for the camera's position, in English; `…` stands for the scene's text alternative.
+ * The keys are those of `a11y`, too.
+ */
 export const WORDS = {
   scene: '3D scene',
   role: '3D scene viewer',
@@ -18,10 +21,10 @@ export type ViewWord = 'views' | 'next-view' | 'previous-view' | 'keys-views';
 /** Words of walking, which few pages have. */
 export type WalkWord = 'keys-walk' | 'blocked';
 
-/** Words for people who may move the camera, which come with what listens to them. */
+/** Texts for visitors who may move the camera; loaded with the input code. */
 export type HandWord = 'keys-orbit' | 'keys-fly' | 'interaction-prompt' | 'reset';
 
-/** Words of the switch for what moves by itself, likewise. */
+/** Texts of the button that pauses automatic motion; loaded with its code. */
 export type MotionWord = 'pause' | 'play';
 
 /** Words of VR, AR and measuring, which few pages have. */
@@ -54,7 +57,7 @@ export const languageOf = (strings: SpokenStrings): 'en' | undefined =>
 
 /**
  * The attribute `a11y`: an object, or its JSON.
- * @returns null where it is malformed.
+ * @returns null if it is malformed
  */
 export function readSpokenStrings(value: unknown): SpokenStrings | null {
   if (value === null || value === undefined || value === '') return {};

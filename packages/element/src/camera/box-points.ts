@@ -1,10 +1,13 @@
-/** Where points of the page lie in a box that CSS has transformed. */
+/** Converts points of the page to a box that CSS has transformed. */
 import type { Point } from './gestures.js';
 
-/** From a point of the page, in CSS pixels as of a MouseEvent, to shares of a box's width and height from its upper left corner. NaN where the box is seen from the side. */
+/**
+ * Converts page coordinates, in CSS pixels as in a MouseEvent, to fractions of a box's width and height from its upper
+ * left corner. NaN if the box is seen edge-on.
+ */
 export type BoxPoints = (clientX: number, clientY: number) => Point;
 
-/** Corners of a box, in the order of a loop: left and top in percent. */
+/** Corners of a box in circular order: left and top in percent. */
 const CORNERS = [
   [0, 0],
   [100, 0],
@@ -13,16 +16,17 @@ const CORNERS = [
 ];
 
 /**
- * Measures a box, whatever `transform`, `perspective` and `zoom` lie between it and the page. Browsers give the bounding rectangle of a transformed box, but the exact
- * place of one without extent: one is placed in each corner. The formula is that of Heckbert, "Fundamentals of Texture Mapping and Image Warping" (1989), section 2.2.3.
- * @param box a positioned element
+ * Measures a box under any `transform`, `perspective` and `zoom`. Browsers provide only the bounding rectangle of a
+ * transformed box, but the exact position of one without extent, so one is placed in each corner. The formula is that
+ * of Heckbert, "Fundamentals of Texture Mapping and Image Warping" (1989), section 2.2.3.
+ * @param box A positioned element.
  */
 export function boxPoints(box: HTMLElement): BoxPoints {
   const [p, q, r, s] = cornersOf(box);
   const [ax, ay, bx, by] = [q.x - r.x, q.y - r.y, s.x - r.x, s.y - r.y];
   const [cx, cy] = [p.x - q.x + r.x - s.x, p.y - q.y + r.y - s.y];
   const area = ax * by - ay * bx;
-  // What is nearer is larger: the divisor of the projection is 1 + g u + h v.
+  // Perspective: the divisor of the projection is 1 + g u + h v.
   const [g, h] = [(cx * by - cy * bx) / area, (ax * cy - ay * cx) / area];
   const alongU = { x: q.x - p.x + g * q.x, y: q.y - p.y + g * q.y };
   const alongV = { x: s.x - p.x + h * s.x, y: s.y - p.y + h * s.y };
@@ -35,7 +39,7 @@ export function boxPoints(box: HTMLElement): BoxPoints {
   };
 }
 
-/** Moves on the page, near a point of it, as moves in CSS pixels of the box itself. */
+/** Converts moves on the page, near a point, to CSS pixels of the box itself. */
 export function boxMoves(box: HTMLElement, { x, y }: Point): (point: Point) => Point {
   const at = boxPoints(box);
   const [origin, right, below] = [at(x, y), at(x + 1, y), at(x, y + 1)];

@@ -1,26 +1,26 @@
-/** Below this share of the normalising length a difference cannot be seen, and the value snaps to its goal. */
+/** Below this fraction of the scale a difference is invisible, and the value snaps to its goal. */
 const SETTLED = 2e-5;
-/** Share of the goal below which steps get lost in float64: 2⁻⁵³, times the some 10⁵ steps that a slow motion has. */
+/** Below this fraction of the goal steps are lost in float64: 2⁻⁵³, times about 10⁵ steps of a slow motion. */
 const ROUNDING = 1e-10;
 
 /**
- * Moves a number towards a goal as a critically damped spring does: as fast as possible without overshoot.
+ * Moves a number towards a goal like a critically damped spring: as fast as possible without overshoot.
  *
  * The motion x″ = ω²·(goal − x) − 2ω·x′ is stepped by its exact solution, so the path does not depend on the frame
- * rate: with d = x − goal and k = v + ω·d, after a time t d(t) = (d + k·t)·e^(−ωt) and v(t) = (v − ω·k·t)·e^(−ωt)
- * (any text on the damped harmonic oscillator, for damping ratio 1).
+ * rate: with d = x − goal and k = v + ω·d, after a time t d(t) = (d + k·t)·e^(−ωt) and v(t) = (v − ω·k·t)·e^(−ωt) (any
+ * text on the damped harmonic oscillator, for damping ratio 1).
  */
 export class Damper {
   #velocity = 0;
 
   /**
-   * One step.
-   * @param value present value, in any unit.
-   * @param goal where it goes, in the same unit.
-   * @param stepMs time since the last step in milliseconds, 0 or more.
-   * @param decayMs time constant 1/ω in milliseconds; 0 or less jumps to the goal.
-   * @param scale a typical size of the value, by which "close enough" is measured; above 0.
-   * @returns the next value; exactly `goal` once the motion has ended.
+   * Advances one step.
+   * @param value Current value, in any unit.
+   * @param goal Its goal, in the same unit.
+   * @param stepMs Time since the last step in milliseconds, 0 or more.
+   * @param decayMs Time constant 1/ω in milliseconds; 0 or less jumps to the goal.
+   * @param scale A typical size of the value, which defines the tolerance; above 0.
+   * @returns The next value; exactly `goal` once the motion has ended.
    */
   step(value: number, goal: number, stepMs: number, decayMs: number, scale: number): number {
     if (value === goal && this.#velocity === 0) return goal;
@@ -31,13 +31,13 @@ export class Damper {
     const decay = Math.exp(-frequency * stepMs);
     const nextDistance = (distance + slope * stepMs) * decay;
     this.#velocity = (this.#velocity - frequency * slope * stepMs) * decay;
-    // Next to a large goal the last, tiny steps would be lost in rounding, and the motion would never end.
+    // Near a large goal the last, tiny steps would be lost in rounding, and the motion would never end.
     const close = Math.max(SETTLED * scale, ROUNDING * Math.abs(goal));
     const settled = Math.abs(nextDistance) < close && Math.abs(this.#velocity) < close * frequency;
     return settled ? this.#rest(goal) : goal + nextDistance;
   }
 
-  /** Forgets the velocity; the next step starts from rest. */
+  /** Resets the velocity to 0. */
   stop(): void {
     this.#velocity = 0;
   }

@@ -1,10 +1,10 @@
 import type { Point } from './gestures.js';
 
-/** Longest that a finger rests for a tap, and longest from one tap to the next, ms: as touch browsers have it. */
+/** Maximum duration of a tap, and maximum interval between two taps, ms: as in touch browsers. */
 const TAP_MS = 300;
-/** A finger that has moved further is no tap, CSS pixels. */
+/** Maximum movement of a tap, CSS pixels. */
 const TAP_SLOP = 10;
-/** Furthest from the first tap to the second, CSS pixels: fingers are wide. */
+/** Maximum distance between the two taps, CSS pixels. */
 const SAME_PLACE = 32;
 
 interface Tap extends Point {
@@ -12,14 +12,14 @@ interface Tap extends Point {
 }
 
 /**
- * Tells double taps from all else that fingers do. Whether two taps are a `dblclick`, too, browsers decide each their own way, by what they zoom
- * and scroll. Pure: times are handed in.
+ * Detects double taps. Browsers differ in when two taps fire `dblclick`, depending on zooming and scrolling, so taps
+ * are detected here. Pure: times are passed in.
  */
 export class DoubleTap {
   #down: Tap | undefined;
   #first: Tap | undefined;
 
-  /** A finger comes down. @param isAlone false while others are down: two fingers do not tap */
+  /** Handles a finger that goes down. @param isAlone False while others are down, because two fingers do not tap. */
   down(point: Point, ms: number, isAlone: boolean): void {
     if (!isAlone) return this.cancel();
     this.#down = { ...point, ms };
@@ -27,7 +27,7 @@ export class DoubleTap {
     if (isLate) this.#first = undefined;
   }
 
-  /** It goes up; true for the end of a second tap where the first one was. */
+  /** Handles a finger that goes up; returns true at the end of a second tap near the first one. */
   up(point: Point, ms: number): boolean {
     const [down, first] = [this.#down, this.#first];
     this.cancel();
@@ -37,7 +37,7 @@ export class DoubleTap {
     return false;
   }
 
-  /** What fingers do is something else: the page scrolls, or there are two. */
+  /** Discards the taps: the page scrolls, or there are two fingers. */
   cancel(): void {
     this.#down = undefined;
     this.#first = undefined;

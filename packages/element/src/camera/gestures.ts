@@ -1,6 +1,6 @@
-/** What pointers, wheel and keys mean for a camera. Pure: knows positions and key names, no page. */
+/** Maps pointers, wheel and keys to camera actions. Pure: uses positions and key names, without the DOM. */
 
-/** What a gesture does: angles in radians, a factor of the distance, shares of the picture's height. */
+/** Effect of a gesture: angles in radians, a factor of the distance, fractions of the frame's height. */
 export type CameraAction =
   | { readonly type: 'orbit'; readonly theta: number; readonly phi: number }
   | { readonly type: 'zoom'; readonly factor: number }
@@ -18,30 +18,31 @@ const KEY_ZOOM = 1.2;
 const KEY_PAN = 0.1;
 /** Wheel pixels that change the distance by a factor of e. */
 const WHEEL_PIXELS = 500;
-/** A touchpad's pinch arrives as a wheel with Ctrl, in much smaller steps. */
+/** A touchpad's pinch arrives as a wheel event with Ctrl, in much smaller steps. */
 const PINCH_GAIN = 5;
 /** CSS pixels of WheelEvent's other units: a line, a page. */
 const WHEEL_UNIT_PIXELS = [1, 18, 400];
-/** Most that one wheel event may count for, in pixels: some mice jump. */
+/** Limit of one wheel event in pixels, because some mice jump. */
 const MAX_WHEEL_PIXELS = 200;
 
-/** Dragging across the element's height turns the camera once around. */
+/** Dragging across the element's height rotates the camera by a full turn. */
 export function orbitOf(from: Point, to: Point, height: number): CameraAction {
   const turn = (2 * Math.PI) / height;
   return { type: 'orbit', theta: -(to.x - from.x) * turn, phi: -(to.y - from.y) * turn };
 }
 
-/** The target stays under the pointer: the camera moves against the drag. */
+/** The target stays under the pointer, so the camera moves against the drag. */
 export function panOf(from: Point, to: Point, height: number): CameraAction {
   return { type: 'pan', right: -(to.x - from.x) / height, up: (to.y - from.y) / height };
 }
 
-/** CSS pixels that one finger must move before it is known where it goes. */
+/** Minimum movement of one finger in CSS pixels before its direction is known. */
 export const TOUCH_SLOP = 4;
 
 /**
- * Whether a one-finger drag is the camera's, by the CSS `touch-action` of the picture and the way the drag sets out.
- * The browser decides likewise for its own scrolling, but only after the first moves have been told to the page.
+ * Whether a one-finger drag moves the camera, according to the CSS `touch-action` of the frame and the initial
+ * direction. The browser decides in the same way about scrolling, but only after it has reported the first moves to the
+ * page.
  */
 export function isCameraDrag(touchAction: string, from: Point, to: Point): boolean {
   const isHorizontal = Math.abs(to.x - from.x) >= Math.abs(to.y - from.y);
@@ -50,21 +51,21 @@ export function isCameraDrag(touchAction: string, from: Point, to: Point): boole
   );
 }
 
-/** Two fingers: what lies between them stays there. */
+/** Two fingers: the point between them stays fixed. */
 export function pinchOf(from: readonly [Point, Point], to: readonly [Point, Point], height: number): CameraAction[] {
   const [before, after] = [distance(from), distance(to)];
   const pan = panOf(middle(from), middle(to), height);
   return before > 0 && after > 0 ? [pan, { type: 'zoom', factor: before / after }] : [pan];
 }
 
-/** A turn of the wheel; scrolling down goes away from the target. */
+/** A turn of the wheel; scrolling down moves away from the target. */
 export function wheelOf(event: { deltaY: number; deltaMode: number; ctrlKey: boolean }): CameraAction {
   const pixels = event.deltaY * (WHEEL_UNIT_PIXELS[event.deltaMode] ?? 1) * (event.ctrlKey ? PINCH_GAIN : 1);
   const bounded = Math.min(MAX_WHEEL_PIXELS, Math.max(-MAX_WHEEL_PIXELS, pixels));
   return { type: 'zoom', factor: Math.exp(bounded / WHEEL_PIXELS) };
 }
 
-/** A key, named as in KeyboardEvent.key; null if it means nothing here. Arrows move the camera their way. */
+/** Maps a key, named as in KeyboardEvent.key; null if it has no effect. Arrows move the camera in their direction. */
 export function keyOf(key: string, shift: boolean): CameraAction | null {
   switch (key) {
     case 'ArrowLeft':

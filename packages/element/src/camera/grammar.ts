@@ -1,32 +1,33 @@
 import type { Vector3 } from '@gaussian-splat/core';
 
 /**
- * Grammar of the camera attributes: tuples of numbers with CSS-like units, as `<model-viewer>` has them, without
- * `calc()` and `env()`; what is left out at the end is `auto`, as there. An attribute that is absent takes its default; a malformed one takes it too, with a warning.
+ * Grammar of the camera attributes: tuples of numbers with CSS-like units, as in `<model-viewer>`, without `calc()` and
+ * `env()`; missing trailing values are `auto`. An absent attribute gets its default; so does a malformed one, with a
+ * warning.
  */
 
-/** A length in metres (one world unit is one metre) or a multiple of the radius that frames the scene. */
+/** A length in meters (one world unit is one meter) or a multiple of the radius that frames the scene. */
 export type RadiusSetting = { readonly metres: number } | { readonly framings: number } | 'auto';
 /** Radians. */
 export type AngleSetting = number | 'auto';
 
-/** What `camera-orbit` and its limits say. Angles in radians. */
+/** Value of `camera-orbit` and its limits. Angles in radians. */
 export interface OrbitSetting {
   readonly theta: AngleSetting;
   readonly phi: AngleSetting;
   readonly radius: RadiusSetting;
 }
 
-/** What `camera-target` says: metres in viewer space. */
+/** Value of `camera-target`: meters in viewer space. */
 export type TargetSetting = readonly [x: number | 'auto', y: number | 'auto', z: number | 'auto'];
 
-/** One attribute: how its text is read, and what is meant where it is absent or malformed. */
+/** Grammar of one attribute: its parser, and its default. */
 export interface AttributeGrammar<T> {
-  /** What the attribute should look like, for warnings. */
+  /** The expected format, for warnings. */
   readonly expected: string;
-  /** Text that an absent attribute stands for. */
+  /** Text of the default. */
   readonly fallback: string;
-  /** The value, or null if the text is malformed. */
+  /** Returns the value, or null if the text is malformed. */
   parse(text: string): T | null;
 }
 
@@ -49,7 +50,7 @@ function parseAngle(term: string): AngleSetting | null {
   if (term === 'auto') return 'auto';
   const quantity = parseQuantity(term);
   if (quantity === null) return null;
-  // As in CSS, only zero may go without a unit: degrees and radians are too easily confused.
+  // As in CSS, only zero may omit the unit, because degrees and radians are easily confused.
   if (quantity.unit === '') return quantity.value === 0 ? 0 : null;
   const radians = RADIANS_PER_UNIT[quantity.unit];
   return radians === undefined ? null : quantity.value * radians;
@@ -88,13 +89,13 @@ function parseFieldOfView(text: string): AngleSetting | null {
   return angle === 'auto' || (angle !== null && angle > 0 && angle < Math.PI) ? angle : null;
 }
 
-/** An angle that is one, such as `30deg`: radians, or null. */
+/** An explicit angle, such as `30deg`: radians, or null. */
 const parsePlainAngle = (text: string): number | null => {
   const angle = parseAngle(text.trim().toLowerCase());
   return angle === 'auto' ? null : angle;
 };
 
-/** Three lengths, such as `1m 2cm 0`: metres, or null. Also what directions are written as. */
+/** Three lengths, such as `1m 2cm 0`: meters, or null. Also the format of directions. */
 export function parsePoint(text: string): readonly [x: number, y: number, z: number] | null {
   const [x, y, z, ...rest] = terms(text).map(parseLength);
   const isPoint = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' && rest.length === 0;
@@ -133,7 +134,7 @@ export const targetGrammar: AttributeGrammar<TargetSetting> = {
   parse: parseTarget,
 };
 
-/** An axis such as `-y`, or three numbers: a direction of length 1, or null. */
+/** An axis such as `-y`, or three numbers: a unit vector, or null. */
 export function parseUp(text: string): Vector3 | null {
   const [, sign, axis] = /^(-?)([xyz])$/.exec(terms(text).join(' ')) ?? [];
   const length = sign ? -1 : 1;
@@ -142,7 +143,7 @@ export function parseUp(text: string): Vector3 | null {
   return size > 0 ? (up.map((value) => value / size) as [number, number, number]) : null;
 }
 
-/** `up`: undefined, `auto`, for what the scene says. */
+/** `up`: undefined, `auto`, for that of the scene. */
 export const upGrammar: AttributeGrammar<Vector3 | undefined> = {
   expected: 'x, -x, y, -y, z, -z, or a direction such as "0.1 -1 0.2"',
   fallback: 'auto',
@@ -164,7 +165,7 @@ export const numberGrammar = (
   },
 });
 
-/** A keyword out of a closed list, such as `touch-action`. The first is the default. */
+/** A keyword from a closed list, such as `touch-action`. The first is the default. */
 export const keywordGrammar = <T extends string>(keywords: readonly T[]): AttributeGrammar<T> => ({
   expected: `one of ${keywords.join(', ')}`,
   fallback: keywords[0],
@@ -172,8 +173,8 @@ export const keywordGrammar = <T extends string>(keywords: readonly T[]): Attrib
 });
 
 /**
- * Value of an attribute: absent or empty takes the default; malformed takes it too and tells `warn` what was expected.
- * `warn` gets one sentence.
+ * Parses an attribute: an absent or empty one gets the default; so does a malformed one, after `warn` is called with
+ * one sentence about the expected format.
  */
 export function readAttribute<T>(
   name: string,

@@ -1,7 +1,7 @@
-/** Lengths in attributes that only late code reads. */
+/** Lengths in attributes that only late-loaded code reads. */
 import { METRES_PER_UNIT, parseQuantity, type AttributeGrammar } from './grammar.js';
 
-/** A length above 0 with a unit, such as `1.6m` or `37cm`: meters, or null. */
+/** A positive length with a unit, such as `1.6m` or `37cm`: meters, or null. */
 const parseExtent = (text: string): number | null => {
   const quantity = parseQuantity(text.trim().toLowerCase());
   const meters = quantity === null || quantity.unit === '' ? undefined : METRES_PER_UNIT[quantity.unit];
@@ -14,7 +14,7 @@ export const lengthGrammar = (fallback: string): AttributeGrammar<number> => ({
   parse: parseExtent,
 });
 
-/** The same, or undefined: what is not written. */
+/** The same, or undefined if absent. */
 export const optionalLengthGrammar: AttributeGrammar<number | undefined> = {
   expected: 'a length above 0 with m, cm or mm, such as 1m or 37cm',
   fallback: '',

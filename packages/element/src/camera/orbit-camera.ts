@@ -2,17 +2,17 @@ import type { Vector3 } from '@gaussian-splat/core';
 import { Damper } from './damper.js';
 import { eyeOfPose, orbitAxes, type CameraPose } from './orbit.js';
 
-/** What a motion keeps on course: the target that the camera turns around, or the eye of one that flies. */
+/** Fixed point of a motion: the target that the camera orbits, or the eye of a flying camera. */
 export type Pivot = 'target' | 'eye';
 
-/** Smallest and largest value that each part of a pose may take. */
+/** Lower and upper limit of each component of a pose. */
 export interface CameraLimits {
   readonly min: CameraPose;
   readonly max: CameraPose;
 }
 
 const KEYS = ['theta', 'phi', 'radius', 'x', 'y', 'z', 'fieldOfView'] as const;
-/** The parts of a pose that say where it is; the others say how it looks from there. */
+/** Components of a pose for its position; the others define the view from there. */
 const PLACE = ['x', 'y', 'z'] as const;
 const everywhere = (value: number): CameraPose => ({
   theta: value,
@@ -25,8 +25,8 @@ const everywhere = (value: number): CameraPose => ({
 });
 
 /**
- * A camera that turns around a target: where it is now, where it is going, and the damped way between.
- * Knows no page, no attribute and no scene.
+ * A camera that orbits a target: its current pose, its goal, and the damped motion between them. Independent of page,
+ * attributes and scene.
  */
 export class OrbitCamera {
   #now: CameraPose;
@@ -40,17 +40,17 @@ export class OrbitCamera {
     this.#goal = pose;
   }
 
-  /** Where the camera is. */
+  /** The current pose. */
   get now(): CameraPose {
     return this.#now;
   }
 
-  /** Where it is going; the same values as {@link now} when it stands still. */
+  /** The goal; equal to {@link now} at rest. */
   get goal(): CameraPose {
     return this.#goal;
   }
 
-  /** True while {@link step} still has something to do. */
+  /** Whether {@link step} still has something to do. */
   get moving(): boolean {
     return KEYS.some((key) => this.#now[key] !== this.#goal[key]);
   }
@@ -59,21 +59,21 @@ export class OrbitCamera {
     return this.#pivot;
   }
 
-  /** With `eye` a camera that looks around stays where it is also on the way to its goal. */
+  /** The pivot `eye` keeps the position of a camera that looks around, also on the way to its goal. */
   set pivot(pivot: Pivot) {
     if (pivot === this.#pivot) return;
     this.#pivot = pivot;
-    // Their velocities were those of another point.
+    // Their velocities belong to another point.
     for (const damper of this.#dampers) damper.stop();
   }
 
-  /** Bounds of every goal from now on; the present goal is brought within them. */
+  /** Limits of all further goals; the current goal is clamped to them. */
   set limits(limits: CameraLimits) {
     this.#limits = limits;
     this.setGoal({});
   }
 
-  /** Changes parts of the goal, within the limits. */
+  /** Changes components of the goal, within the limits. */
   setGoal(changes: Partial<CameraPose>): void {
     const { min, max } = this.#limits;
     const wanted = { ...this.#goal, ...changes };
@@ -82,7 +82,7 @@ export class OrbitCamera {
     this.#goal = goal;
   }
 
-  /** Takes full turns off the present azimuth, so that the way to the goal is the short one. */
+  /** Removes full turns from the current azimuth, so that the path to the goal is the short one. */
   unwind(): void {
     const turns = Math.round((this.#goal.theta - this.#now.theta) / (2 * Math.PI));
     this.#now = { ...this.#now, theta: this.#now.theta + turns * 2 * Math.PI };
@@ -96,9 +96,9 @@ export class OrbitCamera {
 
   /**
    * One step of the damped motion.
-   * @param stepMs time since the last step, milliseconds.
-   * @param decayMs time constant of the motion, milliseconds; 0 jumps.
-   * @returns whether the camera has moved.
+   * @param stepMs Time since the last step, milliseconds.
+   * @param decayMs Time constant of the motion, milliseconds; 0 jumps.
+   * @returns Whether the camera has moved.
    */
   step(stepMs: number, decayMs: number): boolean {
     if (!this.moving) return false;
@@ -109,12 +109,12 @@ export class OrbitCamera {
       const scale = key === 'theta' || key === 'phi' || key === 'fieldOfView' ? 1 : to.radius;
       now[key] = this.#dampers[i].step(from[key], to[key], stepMs, decayMs, scale);
     });
-    // At its end the motion is exactly at the goal: the way there and back through the eye would leave a rounding.
+    // At its end the motion is exactly at the goal, without the rounding error of converting through the eye.
     this.#now = KEYS.every((key) => now[key] === to[key]) ? this.#goal : this.#offCourse(now);
     return true;
   }
 
-  /** The pose with the place of what is kept on course. */
+  /** The pose with the position that keeps the pivot fixed. */
   #onCourse(pose: CameraPose): CameraPose {
     if (this.#pivot === 'target') return pose;
     const [x, y, z] = eyeOfPose(pose);
@@ -125,7 +125,10 @@ export class OrbitCamera {
     return this.#pivot === 'target' ? pose : withTargetAhead(pose);
   }
 
-  /** Turns camera and goal alike around the {@link pivot}, without any damping: radians. @returns how far the limits let them */
+  /**
+   * Rotates camera and goal equally around the {@link pivot}, without damping: radians. @returns The angle within the
+   * limits.
+   */
   turnBy(theta: number): number {
     const before = this.#goal.theta;
     const isStill = !this.moving;
@@ -137,19 +140,19 @@ export class OrbitCamera {
     return turned;
   }
 
-  /** Turns the goal's view around its own eye by angles in radians. */
+  /** Rotates the goal's view around its own eye by angles in radians. */
   lookBy(theta: number, phi: number): void {
     const [x, y, z] = eyeOfPose(this.#goal);
     this.setGoal({ theta: this.#goal.theta + theta, phi: this.#goal.phi + phi });
     this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
   }
 
-  /** Puts the goal's eye at a point; it looks where it looked. */
+  /** Moves the goal's eye to a point; the direction does not change. */
   setEye([x, y, z]: Vector3): void {
     this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
   }
 
-  /** Moves the goal along its own axes, eye and target alike: world units. */
+  /** Moves the goal along its own axes, eye and target equally: world units. */
   moveBy(right: number, up: number, forward: number): void {
     const goal = this.#goal;
     const axes = orbitAxes(goal.theta, goal.phi);
@@ -158,7 +161,7 @@ export class OrbitCamera {
     this.setGoal({ x: goal.x + along(0), y: goal.y + along(1), z: goal.z + along(2) });
   }
 
-  /** Turns the goal around its target by angles in radians. */
+  /** Rotates the goal around its target by angles in radians. */
   orbitBy(theta: number, phi: number): void {
     this.setGoal({ theta: this.#goal.theta + theta, phi: this.#goal.phi + phi });
   }
@@ -169,9 +172,9 @@ export class OrbitCamera {
   }
 
   /**
-   * Moves the target in the plane of the picture.
-   * @param right share of the picture's height by which the camera moves to its right.
-   * @param up the same, upwards.
+   * Moves the target in the image plane.
+   * @param right Motion of the camera to its right, as a fraction of the frame's height.
+   * @param up The same, upwards.
    */
   panBy(right: number, up: number): void {
     const goal = this.#goal;
@@ -180,7 +183,7 @@ export class OrbitCamera {
   }
 }
 
-/** A pose whose place is that of its eye, with that of its target instead. */
+/** Converts a pose with the position of its eye to one with that of its target. */
 function withTargetAhead(pose: CameraPose): CameraPose {
   const { backward } = orbitAxes(pose.theta, pose.phi);
   const [x, y, z] = PLACE.map((key, axis) => pose[key] - pose.radius * backward[axis]);

@@ -1,16 +1,16 @@
-/** Between points of the scene and pixels of a picture. */
+/** Converts between points of the scene and pixels of a frame. */
 import type { Camera, Vector3 } from '@gaussian-splat/core';
 
-/** Where a point of the scene lies in a picture. */
+/** Position of a scene point in a frame. */
 export interface Projected {
   /** Pixels from the left and the top edge. */
   readonly x: number;
   readonly y: number;
-  /** World units along the camera's axis; 0 or less is behind the camera, and then x and y mean nothing. */
+  /** World units along the optical axis; 0 or less is behind the camera, and then x and y are undefined. */
   readonly depth: number;
 }
 
-/** A point of the scene's frame, as the camera sees it. */
+/** Projects a point in scene coordinates. */
 export function project({ worldToCamera: m, fx, fy, cx, cy, orthographic }: Camera, [x, y, z]: Vector3): Projected {
   const row = (r: number): number => m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
   const depth = row(2);
@@ -18,12 +18,12 @@ export function project({ worldToCamera: m, fx, fy, cx, cy, orthographic }: Came
   return { x: (fx * row(0)) / shrink + cx, y: (fy * row(1)) / shrink + cy, depth };
 }
 
-/** The point of the scene's frame that lies at a depth behind a place in the picture: the inverse of {@link project}. */
+/** Returns the point in scene coordinates at a pixel and depth: the inverse of {@link project}. */
 export function unproject(camera: Camera, { x, y, depth }: Projected): Vector3 {
   const { worldToCamera: m, fx, fy, cx, cy, orthographic } = camera;
   const stretch = orthographic ? 1 : depth;
   const inCamera = [(stretch * (x - cx)) / fx - m[3], (stretch * (y - cy)) / fy - m[7], depth - m[11]];
-  // The matrix is a rotation and a translation, so its transpose takes directions back.
+  // The matrix is a rotation and a translation, so its transpose inverts directions.
   const column = (c: number): number => m[c] * inCamera[0] + m[4 + c] * inCamera[1] + m[8 + c] * inCamera[2];
   return [column(0), column(1), column(2)];
 }

@@ -1,10 +1,10 @@
-/** What the camera attributes mean for a given scene and picture: settings with `auto` and `%` become a pose. */
+/** Converts camera attributes for a given scene and frame: settings with `auto` and `%` become a pose. */
 import type { Bounds, Vector3 } from '@gaussian-splat/core';
 import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting } from './grammar.js';
 import { framingDistance, toViewer, viewerFrame, type CameraPose, type ViewerFrame } from './orbit.js';
 import type { CameraLimits } from './orbit-camera.js';
 
-/** All camera attributes, read. */
+/** The parsed camera attributes. */
 export interface CameraSettings {
   readonly orbit: OrbitSetting;
   readonly minOrbit: OrbitSetting;
@@ -15,22 +15,22 @@ export interface CameraSettings {
   readonly fieldOfView: AngleSetting;
   readonly minFieldOfView: AngleSetting;
   readonly maxFieldOfView: AngleSetting;
-  /** Direction of the scene's frame that points up, of length 1; undefined for what the scene says, else -y. */
+  /** Unit vector that points up in scene coordinates; undefined for that of the scene, else -y. */
   readonly up: Vector3 | undefined;
 }
 
-/** Bounds of a scene, in its own frame. */
+/** Bounds of a scene, in its own coordinates. */
 export interface SceneBounds extends Bounds {
-  /** The direction that points up, of length 1, where the scene declares one. */
+  /** Unit vector that points up, if the scene declares one. */
   readonly up?: Vector3 | undefined;
 }
 
-/** Rotation from the frame of a scene to viewer space. */
+/** Rotation from scene coordinates to viewer space. */
 export const frameOf = ({ up }: Pick<CameraSettings, 'up'>, bounds: Pick<SceneBounds, 'up'>): ViewerFrame =>
   viewerFrame(up ?? bounds.up ?? [0, -1, 0]);
 
 const DEGREE = Math.PI / 180;
-/** What `auto` stands for. */
+/** Values of `auto`. */
 const AUTO = {
   theta: 0,
   phi: 75 * DEGREE,
@@ -39,7 +39,7 @@ const AUTO = {
   maxFieldOfView: 160 * DEGREE,
   minPhi: 22.5 * DEGREE,
   maxPhi: 157.5 * DEGREE,
-  /** Closest and farthest distance, as multiples of the framing distance. */
+  /** Nearest and farthest distance, as multiples of the framing distance. */
   minFramings: 0.02,
   maxFramings: 5,
 };
@@ -51,7 +51,7 @@ function distance(setting: RadiusSetting, auto: number, framing: number): number
   return 'metres' in setting ? setting.metres : setting.framings * framing;
 }
 
-/** The pose that the attributes ask for. `aspect` is width / height of the picture. */
+/** Returns the pose for the attributes. `aspect` is width / height of the frame. */
 export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): CameraPose {
   const fieldOfView = angle(settings.fieldOfView, AUTO.fieldOfView);
   const framing = framingDistance(bounds.radius, fieldOfView, aspect);
@@ -68,7 +68,10 @@ export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: nu
   };
 }
 
-/** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright: by the attributes, and by a flight. */
+/**
+ * Returns the limits for the attributes. An automatic limit is extended for a pose that the attributes or a flight
+ * specify explicitly.
+ */
 export function limitsOf(
   settings: CameraSettings,
   bounds: SceneBounds,

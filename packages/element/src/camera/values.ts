@@ -1,6 +1,6 @@
-/** Present camera values that people read, store and write back: each `toString()` is a valid attribute. */
+/** Current camera values for scripts, which can be stored and written back: each `toString()` is a valid attribute. */
 
-/** Where the camera is, around its target. */
+/** Position of the camera around its target. */
 export class CameraOrbit {
   constructor(theta: number, phi: number, radius: number, framingRadius: number) {
     this.theta = theta;
@@ -12,18 +12,18 @@ export class CameraOrbit {
   readonly theta: number;
   /** Polar angle in radians: 0 straight above the target, π straight below. */
   readonly phi: number;
-  /** Distance to the target in metres (world units). */
+  /** Distance to the target in meters (world units). */
   readonly radius: number;
-  /** The distance that frames the scene in this shape of the element: `100%` of `camera-orbit`. */
+  /** The distance that frames the scene at this aspect ratio: `100%` of `camera-orbit`. */
   readonly framingRadius: number;
 
-  /** A value for `camera-orbit`. Radians and metres, since only they survive the way there and back unrounded. */
+  /** A value for `camera-orbit`. Uses radians and meters, because only they survive a round trip without rounding. */
   toString(): string {
     return `${this.theta}rad ${this.phi}rad ${this.radius}m`;
   }
 }
 
-/** The point that the camera looks at and turns around: metres in viewer space (y up, right-handed). */
+/** The point that the camera looks at and orbits: meters in viewer space (y up, right-handed). */
 export class CameraTarget {
   constructor(x: number, y: number, z: number) {
     this.x = x;
@@ -40,7 +40,7 @@ export class CameraTarget {
   }
 }
 
-/** A point of the scene: metres in viewer space (y up, right-handed). */
+/** A point of the scene: meters in viewer space (y up, right-handed). */
 export class ScenePoint {
   constructor(x: number, y: number, z: number, uncertainty = Infinity) {
     this.x = x;
@@ -52,8 +52,8 @@ export class ScenePoint {
   readonly y: number;
   readonly z: number;
   /**
-   * Half of the distance along the line of sight over which the light goes from 90 % to 10 %, in units of viewer space: small on a solid surface, large at edges
-   * and in haze. Infinity if more than 10 % pass.
+   * Half of the distance along the ray over which the transmittance falls from 90 % to 10 %, in units of viewer space:
+   * small on a solid surface, large at edges and in haze. Infinity if more than 10 % remain.
    */
   readonly uncertainty: number;
 
@@ -63,20 +63,20 @@ export class ScenePoint {
   }
 }
 
-/** A point of the visible surface under a point of the page, and whose it is. */
+/** A point of the visible surface under a point of the page, and the element that it belongs to. */
 export interface PickedPoint extends ScenePoint {
-  /** The `<splat-scene>` or `<splat-mesh>` that was met, or the `<gaussian-splat>` itself for its own scene. */
+  /** The `<splat-scene>` or `<splat-mesh>` at the point, or the `<gaussian-splat>` itself for its own scene. */
   readonly element: Element;
-  /** From the eye, in units of viewer space. */
+  /** Distance from the eye, in units of viewer space. */
   readonly distance: number;
   /**
-   * Number of the splat among those of its scene, in the order in which the renderer stores them; null for a mesh, and where levels of detail are drawn. Of a file, `packedOrder` of
-   * `@gaussian-splat/renderer/tools` has the rows.
+   * Index of the splat in its scene, in the storage order of the renderer; null for a mesh, and for levels of detail.
+   * For a file, `packedOrder` of `@gaussian-splat/renderer/tools` maps it to a row.
    */
   readonly splat: number | null;
-  /** Name of the triangle mesh in its file, empty where it has none; null for splats. */
+  /** Name of the triangle mesh in its file, empty if it has none; null for splats. */
   readonly mesh: string | null;
-  /** Name of its material, likewise. */
+  /** Name of its material, in the same way. */
   readonly material: string | null;
 }
 

@@ -1,13 +1,13 @@
 /**
- * The attributes of `<splat-scene>` and `<splat-mesh>`, each in one place, as those of `<gaussian-splat>` in ../attributes.ts. Properties of the same names take numbers
- * as well.
+ * The attributes of `<splat-scene>` and `<splat-mesh>`, each defined once, as those of `<gaussian-splat>` in
+ * ../attributes.ts. Properties of the same names accept numbers as well.
  */
 import { bareKeyword, flag, read, text, type Attribute } from '../attributes.js';
 import { upGrammar } from '../camera/grammar.js';
 import type { Numbers } from '../live/values.js';
 import { anglesGrammar, boxGrammar, opacityGrammar, pointGrammar, scaleGrammar } from './grammar.js';
 
-/** What both have. */
+/** Attributes of both. */
 const PLACED = {
   /**
    * Same as on `<img>`: `use-credentials` sends cookies to other origins.
@@ -16,7 +16,8 @@ const PLACED = {
    */
   crossorigin: bareKeyword(['anonymous', 'use-credentials']),
   /**
-   * Where its origin is: x y z in metres of viewer space (y up, right-handed), or with `m`, `cm`, `mm`. The property takes `[x, y, z]` as well.
+   * Position of its origin: x y z in meters of viewer space (y up, right-handed), or with `m`, `cm`, `mm`. The property
+   * takes `[x, y, z]` as well.
    * @default `0 0 0`
    * @example position="1m 0 -2m"
    */
@@ -60,19 +61,21 @@ export const SCENE_ATTRIBUTES = {
   src: text<string | Blob | null>(),
   ...PLACED,
   /**
-   * The axis of the file that points up, same as on `<gaussian-splat>`. The scene is turned by it before it is placed.
-   * @default what the scene says, else `-y`
+   * The axis of the file that points up, same as on `<gaussian-splat>`. The scene is rotated by it before it is placed.
+   * @default that of the scene, else `-y`
    * @example up="y"
    */
   up: read(upGrammar),
   /**
-   * Opacity of the scene, 0 to 1: that of a surface which is opaque at 1. Rays that cross several surfaces show more of it.
+   * Opacity of the scene, 0 to 1: that of an otherwise opaque surface. Rays that cross several surfaces show more of
+   * it.
    * @default `1`
    * @example opacity="0.5"
    */
   opacity: read<number, string | number | null>(opacityGrammar),
   /**
-   * Shows only the splats whose centres lie in a box: x y z of its least corner, then of its greatest, in metres and in the axes of the file.
+   * Shows only the splats with centers in a box: x y z of its minimum corner, then of its maximum, in meters and in the
+   * axes of the file.
    * @default all of them
    * @example crop="-1 -1 -1 1 1 1"
    */

@@ -18,13 +18,13 @@ import type { Interaction, InteractionHost, ScenePointerEvent } from './interact
 
 type Written = string | number | ArrayLike<number | string> | null | undefined;
 
-/** Numbers of a property, as an attribute would have them. */
+/** Numbers of a property in the format of an attribute. */
 const written = (value: Written, unit = ''): string | number | null | undefined =>
   typeof value === 'object' && value !== null ? Array.from(value, (each) => `${each}${unit}`).join(' ') : value;
 
-/** Where a child is, and how it is drawn. */
+/** Transform of a child, and its drawing options. */
 export interface ChildPlace {
-  /** From its own frame, once that is turned so that y is up, to viewer space. */
+  /** From its own coordinates, rotated so that y is up, to viewer space. */
   readonly placed: Matrix4;
   readonly up: Vector3 | undefined;
   readonly opacity: number;
@@ -32,11 +32,11 @@ export interface ChildPlace {
   readonly hidden: boolean;
 }
 
-/** As glTF has it. */
+/** Convention of glTF. */
 const UP: Vector3 = [0, 1, 0];
 const NO_VALUES: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
 
-/** Events of a child of `<gaussian-splat>`, with the meanings that they have there. Only those of pointers bubble. */
+/** Events of a child of `<gaussian-splat>`, with the same meanings as there. Only those of pointers bubble. */
 export type ChildEventMap = Record<
   'click' | 'pointerover' | 'pointerout' | 'pointerenter' | 'pointerleave',
   ScenePointerEvent
@@ -58,10 +58,10 @@ export type SettableOf<Table> = Partial<
   PropertiesOf<Table> & Pick<SplatChild, 'matrix' | 'currentTime' | 'playbackRate'> & { hidden: boolean }
 >;
 
-/** What all children have: a source, a place, and what is known of it. */
+/** Common base of all children: a source, a transform, and its state. */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export abstract class SplatChild extends ReactiveElement implements SourceOwner {
-  /** What stands for it among all that its `<gaussian-splat>` shows. @internal */
+  /** Its entry in the sources of its `<gaussian-splat>`. @internal */
   readonly holder = new SourceEntry(this);
   /** @internal */
   protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
@@ -71,41 +71,48 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
 
   constructor() {
     super();
-    // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
+    // Boolean properties are initialized, because frameworks use their type to interpret a bare attribute.
     Object.assign(this, { autoplay: false, loop: false, interactive: false, hidden: false });
   }
 
   /**
-   * All of its place at once, above `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row after row, or a `DOMMatrix`; from its own frame, y up, to viewer space. null for none.
+   * Its whole transform, which overrides `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row-major,
+   * or a `DOMMatrix`; from its own coordinates, y up, to viewer space. null for none.
    */
   declare matrix: ArrayLike<number> | DOMMatrixReadOnly | null;
 
-  /** True while it is shown. */
+  /** Whether it is shown. */
   get loaded(): boolean {
     return this.holder.state === 'ready';
   }
 
-  /** Fulfils, and never rejects, when there is nothing left to wait for: it is shown ({@link loaded}), it cannot be ({@link error}), or it has no source. */
+  /**
+   * Resolves, and never rejects, when nothing is pending: it is shown ({@link loaded}), it failed ({@link error}), or
+   * it has no source.
+   */
   get ready(): Promise<void> {
     return this.updateComplete.then(() => this.holder.scene.settled);
   }
 
-  /** Why it is not shown, or null. */
+  /** Reason that it is not shown, or null. */
   get error(): ElementError | null {
     return this.holder.error;
   }
 
-  /** Share of the loading that is done, 0..1. */
+  /** Loading progress, 0..1. */
   get progress(): number {
     return this.loaded ? 1 : (this.holder.progress ?? 0);
   }
 
-  /** Fetches it again, as if `src` had just been set. */
+  /** Loads it again, as if `src` had just been set. */
   load(): void {
     this.holder.reload();
   }
 
-  /** Seconds into what moves; setting it seeks, and gives it a clock of its own. What has none follows that of its `<gaussian-splat>`. */
+  /**
+   * Playback position in seconds; setting it seeks, and gives the child its own clock. Other children follow that of
+   * their `<gaussian-splat>`.
+   */
   get currentTime(): number {
     return this.holder.playback.currentTime;
   }
@@ -116,17 +123,17 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     this.holder.playback.currentTime = seconds;
   }
 
-  /** Seconds; NaN while nothing moves, Infinity for what has no end. */
+  /** Duration in seconds; NaN if nothing is animated, Infinity without an end. */
   get duration(): number {
     return this.holder.duration;
   }
 
-  /** Whether its time stands still. */
+  /** Whether playback is paused. */
   get paused(): boolean {
     return this.holder.playback.paused;
   }
 
-  /** Speed of its own clock; 1 is that of the clock. */
+  /** Speed of its own clock; 1 is real time. */
   get playbackRate(): number {
     return this.holder.playback.playbackRate;
   }
@@ -138,8 +145,9 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /**
-   * Lets its time run, on a clock of its own, once it is there.
-   * @returns rejects with a `NotSupportedError` where nothing moves, and with an `AbortError` if `pause()` or another `src` comes before it does.
+   * Starts playback on its own clock, once it is loaded.
+   * @returns Rejects with a `NotSupportedError` if nothing is animated, and with an `AbortError` if `pause()` or
+   * another `src` intervenes.
    */
   async play(): Promise<void> {
     this.#drive();
@@ -152,19 +160,19 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     playback.play();
   }
 
-  /** Lets its time stand still. */
+  /** Pauses playback. */
   pause(): void {
     this.#drive();
     this.holder.playback.pause();
   }
 
-  /** From now on it has a clock of its own. */
+  /** It has its own clock from here on. */
   #drive(): void {
     this.#isDriven = true;
     this.holder.hasBegun = true;
   }
 
-  /** It has a clock of its own: it plays by itself, starts again by itself, or a script has moved its time. @internal */
+  /** Whether it has its own clock: it has `autoplay` or `loop`, or a script has controlled its playback. @internal */
   get hasOwnClock(): boolean {
     return this.autoplay || this.loop || this.#isDriven;
   }
@@ -201,12 +209,12 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   /** @internal */
   seenFrom(camera: Camera, member: Member | undefined, { frame }: EntryStage): Camera {
     const { placed, up } = this.#placed;
-    // Where it will stand, before anything is known of it.
+    // Its future transform, before it is loaded.
     const matrix = member?.placement.sceneToWorld ?? sceneToWorld(frame, placed, frameOf({ up }, {}));
     return isSolid(matrix) ? cameraInScene(camera, matrix) : camera;
   }
 
-  /** From the frame of its own children, y up, to the world. @internal */
+  /** From the coordinates of its own children, y up, to the world. @internal */
   frameToWorld({ scene, placement }: Member): Matrix4 {
     const own = transposed(matrixOfFrame(frameOf({ up: this.#placed.up }, scene.bounds)));
     return placement.sceneToWorld ? multiply(placement.sceneToWorld, own) : own;
@@ -225,7 +233,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     this.#place = undefined;
   }
 
-  /** Its place in viewer space. */
+  /** Its transform in viewer space. */
   #readPlaced(): Matrix4 {
     if (this.matrix !== null && this.matrix !== undefined) {
       const matrix = readMatrix(this.matrix);
@@ -241,7 +249,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
     });
   }
 
-  /** An attribute by its grammar; a malformed one counts as absent, with a warning. @internal */
+  /** Parses an attribute; a malformed one counts as absent, with a warning. @internal */
   protected read<T>(name: string, value: Written): T {
     const grammar = this.table[name].grammar!;
     return readAttribute(name, written(value), grammar, (sentence) =>
@@ -263,11 +271,11 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    // With its element around it, it stays what it is, and goes when that does.
+    // If it moves with its parent element, its state stays, and ends with that of the parent.
     if (this.parentElement !== this.holder.parent) this.holder.attach(null);
   }
 
-  /** It shows nothing of its own. */
+  /** It renders nothing itself. */
   protected override createRenderRoot(): HTMLElement {
     return this;
   }
@@ -293,27 +301,27 @@ export interface SplatChild extends Omit<PropertiesOf<typeof MESH_ATTRIBUTES>, '
   ): void;
 }
 
-/** What Lit is told of a child's properties. */
+/** Property declarations of a child for Lit. */
 export const childDeclarations = (
   table: Readonly<Record<string, Attribute<unknown, unknown>>>,
 ): PropertyDeclarations => ({
   ...declarations(table),
   matrix: { attribute: false },
   hidden: { type: Boolean, reflect: true },
-  // Accessors: named here so that what a page sets before the element is defined reaches them.
+  // Accessors are listed here so that values that a page sets before the definition of the element reach them.
   currentTime: { attribute: false, noAccessor: true },
   playbackRate: { attribute: false, noAccessor: true },
 });
 
-/** What children ask of the element around them. */
+/** Interface of the parent element for children. */
 export type ChildStage = EntryStage & InteractionHost;
 
-/** The stages of elements that have children. */
+/** Cores of elements with children. */
 export const stages = new WeakMap<Element, ChildStage>();
 
 const interactions = new WeakMap<Element, Lazy<Interaction>>();
 
-/** Lets visitors click the children of an element, once one of them wants it. */
+/** Enables clicks on the children of an element, once one of them is interactive. */
 function interactionChanged(child: SplatChild): void {
   const parent = child.parentElement;
   const stage = parent && stages.get(parent);
@@ -331,10 +339,10 @@ function interactionChanged(child: SplatChild): void {
   else code.want(({ message }) => child.warn(message));
 }
 
-/** Gives a child to its element. One that has not looked at its children yet asks for them itself. */
+/** Attaches a child to its parent element. A parent that is not set up yet attaches its children later. */
 export function adopt(child: SplatChild): void {
   const { parentElement } = child;
-  // Its first update may have come before its element looked at its children.
+  // Its first update may precede the setup of its parent.
   interactionChanged(child);
   child.holder.attach((parentElement && stages.get(parentElement)) ?? null);
 }

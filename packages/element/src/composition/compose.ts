@@ -1,4 +1,4 @@
-/** Loaded when an element has its first child that is a scene or a mesh. */
+/** Loaded when an element gets its first child with a scene or a mesh. */
 import { adopt, SplatChild, stages, type ChildStage } from './child.js';
 import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
@@ -10,7 +10,7 @@ export function define(): void {
   customElements.define('splat-mesh', SplatMeshElement);
 }
 
-/** Lets an element show its children. */
+/** Enables children of an element. */
 export function compose(stage: ChildStage): void {
   stages.set(stage.element, stage);
   define();

@@ -38,7 +38,7 @@ export const scaleGrammar: AttributeGrammar<Vector3> = {
 /** `opacity`. */
 export const opacityGrammar = numberGrammar(1, 0, 'a number from 0 to 1', 1);
 
-/** `crop`: two corners; undefined for all. */
+/** `crop`: two corners; undefined for no crop. */
 export const boxGrammar: AttributeGrammar<readonly number[] | undefined> = {
   expected: '"x y z x y z" in metres, two corners of a box, the least first',
   fallback: 'none',

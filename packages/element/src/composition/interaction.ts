@@ -1,4 +1,4 @@
-/** Loaded when a child of an element is `interactive`: who is clicked, and what the pointer is over. */
+/** Loaded when a child of an element is `interactive`: clicks on children and hovering. */
 import type { Camera } from '@gaussian-splat/core';
 import { boundsOfWorld } from '@gaussian-splat/renderer/tools';
 import { css, type ReactiveControllerHost } from 'lit';
@@ -8,7 +8,7 @@ import { adoptStyles } from '../styles.js';
 import { word, type SpokenStrings } from '../words.js';
 import { SplatChild } from './child.js';
 
-/** What clicks on children need of the element. */
+/** Interface of the element for clicks on children. */
 export interface InteractionHost {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly surface: HTMLElement | null;
@@ -19,9 +19,9 @@ export interface InteractionHost {
   positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null>;
 }
 
-/** A click or a move of the pointer that meets a child, as the browser's own events meet an element of HTML. */
+/** A click or pointer event on a child, analogous to the browser's events on HTML elements. */
 export class ScenePointerEvent extends PointerEvent {
-  /** What was met; null for a click by key, and beside everything. */
+  /** The picked point; null for a click by key, and outside all children. */
   readonly hit: PickedPoint | null;
 
   constructor(type: string, init: PointerEventInit, hit: PickedPoint | null) {
@@ -30,9 +30,9 @@ export class ScenePointerEvent extends PointerEvent {
   }
 }
 
-/** Least time between two looks for what is under a moving pointer, ms; and how many times as long as a look took. */
+/** Minimum interval between two picks under a moving pointer, ms, and as a multiple of the duration of a pick. */
 const [HOVER_MS, HOVER_SHARE] = [60, 3];
-/** Around what has the keyboard, CSS pixels: bounds are those of the centers of splats. */
+/** Margin around a focused child in CSS pixels, because bounds contain only the centers of splats. */
 const MARGIN = 12;
 
 const STYLES = css`
@@ -57,8 +57,9 @@ const STYLES = css`
 `;
 
 /**
- * Gives children the clicks and moves of the pointer that meet them. A click on the image is held back until the GPU has said what lies there, and then comes once, to the
- * child or to the element itself. For keys there is a button for each child, which pointers pass by.
+ * Dispatches clicks and pointer moves to children. A click on the frame is delayed until the GPU has picked the point,
+ * and is then dispatched once, to the child or to the element itself. For keyboards there is a button for each child,
+ * which ignores pointers.
  */
 export class Interaction {
   readonly #of: InteractionHost;
@@ -66,7 +67,7 @@ export class Interaction {
   readonly #buttons = new Map<SplatChild, HTMLButtonElement>();
   #surface: HTMLElement | undefined;
   #over: SplatChild | null = null;
-  /** The latest move of the pointer that was not looked at yet. */
+  /** The latest pointer move without a pick. */
   #moved: PointerEvent | undefined;
   #isLooking = false;
 
@@ -81,7 +82,7 @@ export class Interaction {
       attributeFilter: ['aria-label', 'title', 'lang'],
     });
     element.addEventListener('camera-change', () => this.#placeFocused());
-    // Those of children do not bubble.
+    // Events of children do not bubble.
     element.addEventListener('load', () => this.update(), { capture: true });
     element.addController({ hostUpdated: () => this.update() });
     this.update();
@@ -93,7 +94,7 @@ export class Interaction {
     );
   }
 
-  /** Children or their attributes have changed. */
+  /** Call when children or their attributes have changed. */
   update(): void {
     const { surface } = this.#of;
     if (surface === null) return;
@@ -117,7 +118,7 @@ export class Interaction {
   #listen(surface: HTMLElement): void {
     this.#surface = surface;
     surface.after(this.#layer);
-    // What drags, measures or walks has stopped its clicks in the capturing phase.
+    // Code for dragging, measuring or walking stops its clicks in the capturing phase.
     surface.addEventListener('click', (event) => void this.#onClick(event));
     surface.addEventListener('pointermove', (event) => this.#onMove(event));
     surface.addEventListener('pointerleave', (event) => {
@@ -159,13 +160,13 @@ export class Interaction {
   }
 
   #onMove(event: PointerEvent): void {
-    // A finger hovers over nothing, and who drags looks at something else.
+    // Fingers do not hover, and a drag has another purpose.
     if (event.pointerType === 'touch' || event.buttons !== 0 || this.#children.length === 0) return;
     this.#moved = event;
     if (!this.#isLooking) void this.#follow();
   }
 
-  /** Looks for what is under the pointer as long as it moves: no oftener than the GPU can answer at leisure. */
+  /** Picks under the pointer while it moves, at a rate that leaves the GPU time. */
   async #follow(): Promise<void> {
     this.#isLooking = true;
     while (this.#moved) {
@@ -173,7 +174,7 @@ export class Interaction {
       this.#moved = undefined;
       const begin = performance.now();
       const hit = await this.#look(event);
-      // A pointer that has left meanwhile is over nothing.
+      // If the pointer has left meanwhile, it hovers over nothing.
       if (this.#surface?.matches(':hover') !== false) this.#setOver(this.#childOf(hit), event, hit);
       const took = performance.now() - begin;
       await new Promise((resolve) => setTimeout(resolve, Math.max(HOVER_MS, HOVER_SHARE * took)));
@@ -181,7 +182,7 @@ export class Interaction {
     this.#isLooking = false;
   }
 
-  /** A device that is lost answers nothing. */
+  /** A lost device gives no result. */
   #look({ clientX, clientY }: MouseEvent): Promise<PickedPoint | null> {
     return this.#of.positionFromPoint(clientX, clientY).catch(() => null);
   }
@@ -209,7 +210,7 @@ export class Interaction {
     for (const [child, button] of this.#buttons) if (button.matches(':focus')) this.#place(child, button);
   }
 
-  /** Puts the button of a child around it, so that the outline shows who has the keyboard. */
+  /** Positions the button of a child around it, so that its outline shows the keyboard focus. */
   #place(child: SplatChild, button: HTMLButtonElement): void {
     const { drawnFrom: camera, surface } = this.#of;
     const placement = child.holder.member?.placement;
@@ -219,7 +220,7 @@ export class Interaction {
       const side = (axis: number): number => (k & (1 << axis) ? bounds.max : bounds.min)[axis];
       return project(camera, [side(0), side(1), side(2)]);
     });
-    // The eye is within it: it is all around.
+    // The eye is inside the child, which then fills the frame.
     const isAround = corners.some(({ depth }) => depth <= 0);
     const range = (of: 'x' | 'y', size: number): [number, number] => {
       const share = (value: number): number => Math.min(1, Math.max(0, value / size));
@@ -237,7 +238,7 @@ export class Interaction {
 
 const BUBBLES = { bubbles: true, composed: true, cancelable: true } as const;
 
-/** What an event says of the pointer and of keys. */
+/** Pointer and key fields for an event. */
 function initOf(event: MouseEvent): PointerEventInit {
   const { clientX, clientY, screenX, screenY, button, buttons, detail, view } = event;
   const { ctrlKey, shiftKey, altKey, metaKey } = event;

@@ -6,8 +6,8 @@ import { MESH_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import { childDeclarations, SplatChild } from './child.js';
 
 /**
- * A triangle mesh among scenes, as a child of `<gaussian-splat>`: glTF or GLB with its materials and animations. It hides splats behind it, and they hide it.
- * Lit by even light from all around, unless its file has lights.
+ * A triangle mesh among scenes, as a child of `<gaussian-splat>`: glTF or GLB with its materials and animations. Meshes
+ * and splats occlude each other. Lit by a neutral environment, unless its file has lights.
  *
  * ```html
  * <gaussian-splat src="room.sog">
@@ -16,15 +16,16 @@ import { childDeclarations, SplatChild } from './child.js';
  * ```
  *
  * @tagname splat-mesh
- * @fires {CustomEvent<LoadDetail>} load - It is shown.
- * @fires {ProgressEvent} progress - Bytes have arrived.
- * @fires {CustomEvent<ElementError>} error - It cannot be shown; `detail` is the same object as the property `error`. The others stay.
- * @fires {ScenePointerEvent} click - With `interactive`: a visitor has clicked it, by pointer or key. Bubbles.
- * @fires {ScenePointerEvent} pointerover - With `interactive`: the pointer has come over it. Bubbles.
- * @fires {ScenePointerEvent} pointerout - With `interactive`: the pointer has left it. Bubbles.
- * @fires {Event} play - As of HTMLMediaElement: its own clock runs.
- * @fires {Event} pause - Its own clock stands still.
- * @fires {Event} ended - Its own clock has come to its end.
+ * @fires {CustomEvent<LoadDetail>} load - Fired when it is shown.
+ * @fires {ProgressEvent} progress - Fired when bytes have arrived.
+ * @fires {CustomEvent<ElementError>} error - Fired when it cannot be shown; `detail` is the same object as the property
+ * `error`. The others stay.
+ * @fires {ScenePointerEvent} click - With `interactive`: fired when a visitor clicks it, by pointer or key. Bubbles.
+ * @fires {ScenePointerEvent} pointerover - With `interactive`: fired when the pointer enters it. Bubbles.
+ * @fires {ScenePointerEvent} pointerout - With `interactive`: fired when the pointer leaves it. Bubbles.
+ * @fires {Event} play - Same as on HTMLMediaElement: fired when its own clock starts.
+ * @fires {Event} pause - Fired when its own clock stops.
+ * @fires {Event} ended - Fired when its own clock reaches its end.
  */
 export class SplatMeshElement extends SplatChild {
   static override properties: PropertyDeclarations = childDeclarations(MESH_ATTRIBUTES);

@@ -9,7 +9,7 @@ import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
 type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
 
 /**
- * A scene among others, as a child of `<gaussian-splat>`: all of them are sorted together and hide one another.
+ * A scene among others, as a child of `<gaussian-splat>`: all of them are sorted together and occlude one another.
  *
  * ```html
  * <gaussian-splat src="room.sog">
@@ -18,17 +18,19 @@ type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
  * ```
  *
  * @tagname splat-scene
- * @fires {CustomEvent<LoadDetail>} load - It is shown.
- * @fires {ProgressEvent} progress - Bytes have arrived.
- * @fires {CustomEvent<ElementError>} error - It cannot be shown; `detail` is the same object as the property `error`. The others stay.
- * @fires {Event} inputs-change - The inputs that the page may set are others; `inputs` has them.
- * @fires {CustomEvent<ElementError>} generator-error - A run of its generator failed; the last good frame stays.
- * @fires {ScenePointerEvent} click - With `interactive`: a visitor has clicked it, by pointer or key. Bubbles.
- * @fires {ScenePointerEvent} pointerover - With `interactive`: the pointer has come over it. Bubbles.
- * @fires {ScenePointerEvent} pointerout - With `interactive`: the pointer has left it. Bubbles.
- * @fires {Event} play - As of HTMLMediaElement: its own clock runs.
- * @fires {Event} pause - Its own clock stands still.
- * @fires {Event} ended - Its own clock has come to its end.
+ * @fires {CustomEvent<LoadDetail>} load - Fired when it is shown.
+ * @fires {ProgressEvent} progress - Fired when bytes have arrived.
+ * @fires {CustomEvent<ElementError>} error - Fired when it cannot be shown; `detail` is the same object as the property
+ * `error`. The others stay.
+ * @fires {Event} inputs-change - Fired when the inputs that the page may set change; `inputs` contains them.
+ * @fires {CustomEvent<ElementError>} generator-error - Fired when a run of its generator fails; the last good frame
+ * stays.
+ * @fires {ScenePointerEvent} click - With `interactive`: fired when a visitor clicks it, by pointer or key. Bubbles.
+ * @fires {ScenePointerEvent} pointerover - With `interactive`: fired when the pointer enters it. Bubbles.
+ * @fires {ScenePointerEvent} pointerout - With `interactive`: fired when the pointer leaves it. Bubbles.
+ * @fires {Event} play - Same as on HTMLMediaElement: fired when its own clock starts.
+ * @fires {Event} pause - Fired when its own clock stops.
+ * @fires {Event} ended - Fired when its own clock reaches its end.
  */
 export class SplatSceneElement extends SplatChild {
   static override properties: PropertyDeclarations = {
@@ -44,13 +46,16 @@ export class SplatSceneElement extends SplatChild {
   declare chain: Properties['chain'];
   declare pose: Properties['pose'];
 
-  /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
+  /**
+   * Controls of a generator by the names of its inputs; they override the attributes `control-NAME`. Set a new object
+   * to change values.
+   */
   declare inputValues: ControlValues | null;
   protected readonly table = SCENE_ATTRIBUTES;
   #liveValues: Omit<LiveState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;
 
-  /** What the page may set of its generators, as of `<gaussian-splat>`; `inputs-change` tells of others. */
+  /** Inputs of its generators that the page may set, same as on `<gaussian-splat>`; `inputs-change` reports changes. */
   get inputs(): readonly GeneratorInput[] {
     return this.holder.inputs;
   }
@@ -67,7 +72,7 @@ export class SplatSceneElement extends SplatChild {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    // Names of controls are the model's: no list of observed attributes can hold them.
+    // The model defines the names of controls, so they cannot be listed in observedAttributes.
     this.#observer ??= new MutationObserver((records) => {
       if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
       this.requestUpdate();

@@ -5,18 +5,21 @@ import type { SpokenStrings } from '../words.js';
 export interface AnnouncerHost {
   readonly viewName: ViewName;
   readonly strings: SpokenStrings;
-  /** True while a person has the keyboard on the picture. */
+  /** Whether the frame has keyboard focus. */
   readonly isFocused: boolean;
 }
 
-/** Least time between two announcements, ms: a screen reader that is interrupted all the time says nothing. */
+/** Minimum interval between two announcements, ms, because a screen reader that is always interrupted says nothing. */
 const INTERVAL_MS = 700;
 
-/** Says where the camera has gone, to people who move it by keyboard and cannot see it: while it has the focus, and not too often. */
+/**
+ * Announces the camera position to visitors who move it by keyboard and cannot see it: while the frame has the focus,
+ * and at a limited rate.
+ */
 export class AnnouncerController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: AnnouncerHost;
-  /** A flight says itself where it has gone. */
+  /** A flight announces its own destination. */
   isQuiet = false;
   #text = '';
   #spoken: ViewName | undefined;
@@ -28,7 +31,7 @@ export class AnnouncerController implements ReactiveController {
     host.addController(this);
   }
 
-  /** What the live region holds. */
+  /** Text of the live region. */
   get text(): string {
     return this.#text;
   }
@@ -45,7 +48,7 @@ export class AnnouncerController implements ReactiveController {
     this.#timer = undefined;
   }
 
-  /** The camera is somewhere else. */
+  /** Call when the camera has moved. */
   cameraMoved(): void {
     if (this.isQuiet || this.#timer !== undefined || !this.#of.isFocused) return;
     this.#timer = setTimeout(this.#speak, INTERVAL_MS);
@@ -59,7 +62,7 @@ export class AnnouncerController implements ReactiveController {
     this.say(viewSentence(name, this.#of.strings));
   };
 
-  /** The picture's name and keys are read on focus; only moves are news. */
+  /** Name and keys of the frame are read on focus, so only moves are announced. */
   readonly #onFocus = (): void => {
     this.#spoken = this.#of.viewName;
   };
@@ -70,7 +73,7 @@ export class AnnouncerController implements ReactiveController {
     this.say('');
   };
 
-  /** Puts a sentence into the live region. */
+  /** Writes a sentence to the live region. */
   say(text: string): void {
     if (text === this.#text) return;
     this.#text = text;

@@ -6,18 +6,21 @@ import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 export interface AutoRotateHost {
   readonly attributes: Pick<Attributes, 'autoRotateDelay' | 'rotationPerSecond'>;
   readonly camera: Pick<CameraController, 'turnBy'>;
-  /** False while the camera must stand still, whatever the attributes say. */
+  /** False while the camera must not move, regardless of the attributes. */
   readonly mayTurn: boolean;
   requestFrame(): void;
 }
 
-/** Turns the camera around the scene while nobody touches it, as if the scene stood on a turntable. */
+/** Rotates the camera around the scene while no visitor interacts, as on a turntable. */
 export class AutoRotateController implements ReactiveController, Mover {
   readonly #of: AutoRotateHost;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isTurning = false;
   #lastStep: number | undefined;
-  /** The scene turns to the right, seen from above against the clock, so the camera goes the other way; and back from where it may go no farther. */
+  /**
+   * The scene rotates to the right, counterclockwise from above, so the camera moves the other way; it reverses at a
+   * limit.
+   */
   #direction = -1;
 
   constructor(host: ReactiveControllerHost, of: AutoRotateHost) {
@@ -34,14 +37,14 @@ export class AutoRotateController implements ReactiveController, Mover {
     this.#stop();
   }
 
-  /** Somebody moved the camera: it stands still for a while. */
+  /** Pauses after a visitor has moved the camera. */
   rest(): void {
     this.#stop();
     if (!this.#of.mayTurn) return;
     this.#timer = setTimeout(() => this.start(), this.#of.attributes.autoRotateDelay);
   }
 
-  /** Turns without a rest before it. */
+  /** Starts without a delay. */
   start(): void {
     this.#stop();
     if (!this.#of.mayTurn) return;
@@ -61,7 +64,7 @@ export class AutoRotateController implements ReactiveController, Mover {
     if (step === 0 || this.#of.camera.turnBy(this.#direction * step) !== 0) return true;
     this.#direction = -this.#direction;
     if (this.#of.camera.turnBy(this.#direction * step) !== 0) return true;
-    // It may go nowhere.
+    // The limits leave no range.
     this.#isTurning = false;
     return false;
   }

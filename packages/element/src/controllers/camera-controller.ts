@@ -13,19 +13,19 @@ import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
 import type { CameraChangeSource } from '../events.js';
 import type { ViewContext } from '../views/camera-view.js';
 
-/** All of a subject that stands alone is shown, of other scenes their middle. */
+/** Frames the whole of an isolated subject, and the center of other scenes. */
 const framed = (bounds: SceneBounds): SceneBounds => ({ ...bounds, ...bounds.subject });
 
-/** What is framed before any scene is known. */
+/** Bounds before any scene is loaded. */
 const UNKNOWN_BOUNDS: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
-/** Longest step of the damped motion, ms: after a pause the camera goes on from where it was. */
+/** Longest step of the damped motion, ms: after a pause the camera continues from its last pose. */
 const MAX_STEP_MS = 100;
-/** Length of the first step after a standstill, ms. */
+/** Length of the first step after a rest, ms. */
 const FIRST_STEP_MS = 1000 / 60;
 
 /**
- * The element's camera: brings together the attributes, the scene's bounds and the picture's aspect, and says where the
- * camera is at a given time.
+ * The element's camera: combines the attributes, the scene's bounds and the frame's aspect ratio into a pose at a given
+ * time.
  */
 export class CameraController {
   readonly #camera: OrbitCamera;
@@ -34,18 +34,21 @@ export class CameraController {
   #bounds = UNKNOWN_BOUNDS;
   #aspect = 1;
   #source: CameraChangeSource = 'none';
-  /** A person has zoomed since the attributes last set the distance; then a new aspect leaves it alone. */
+  /**
+   * Whether a visitor has zoomed since the attributes last set the distance; then a new aspect ratio does not change
+   * it.
+   */
   #userDistance = false;
-  /** A person has moved the camera since a scene was framed. */
+  /** Whether a visitor has moved the camera since a scene was framed. */
   #isTouched = false;
-  /** The element itself has turned it. */
+  /** Whether the element itself has rotated it. */
   #isTurned = false;
   #jumped = false;
-  /** Where a flight has put the camera: automatic limits give way to it. */
+  /** Pose of a flight, which extends automatic limits. */
   #asked: CameraPose | undefined;
   #lastStep: number | undefined;
 
-  /** @param onChange the camera is no longer where it was drawn. */
+  /** @param onChange Called when the camera differs from that of the last frame. */
   constructor(settings: CameraSettings, onChange: () => void) {
     this.#settings = settings;
     this.#onChange = onChange;
@@ -67,38 +70,38 @@ export class CameraController {
     return new FieldOfView(this.#camera.now.fieldOfView);
   }
 
-  /** Rotation from the scene's frame to viewer space, in which orbit and target are. */
+  /** Rotation from scene coordinates to viewer space, the coordinates of orbit and target. */
   get viewerFrame(): ViewerFrame {
     return frameOf(this.#settings, this.#bounds);
   }
 
-  /** What was framed last, in the scene's own frame: of a subject that stands alone, `center` and `radius` are of all of it. */
+  /** The framed bounds, in scene coordinates: for an isolated subject, `center` and `radius` are those of all of it. */
   get bounds(): SceneBounds {
     return this.#bounds;
   }
 
-  /** What stays on course while a person moves: see {@link OrbitCamera.pivot}. */
+  /** Fixed point of a visitor's motion: see {@link OrbitCamera.pivot}. */
   set pivot(pivot: Pivot) {
     this.#camera.pivot = pivot;
   }
 
-  /** A person has moved the camera since it stood where the page put it. */
+  /** Whether a visitor has moved the camera since the page last set it. */
   get isTouched(): boolean {
     return this.#isTouched;
   }
 
-  /** Where it is going. */
+  /** The goal of the motion. */
   get goal(): CameraPose {
     return this.#camera.goal;
   }
 
-  /** What views are read against. */
+  /** Context for parsing views. */
   get context(): ViewContext {
     const [settings, bounds, aspect, from] = [this.#settings, this.#bounds, this.#aspect, this.#camera.goal];
     return { settings, bounds, frame: this.viewerFrame, aspect, from };
   }
 
-  /** Puts the camera there at once, within the limits that the page has set: a step of a flight. */
+  /** Moves the camera at once, within the limits of the page: a step of a flight. */
   moveTo(pose: CameraPose): void {
     this.#source = 'none';
     this.#userDistance = this.#isTouched = true;
@@ -112,14 +115,14 @@ export class CameraController {
     return this.#camera.moving;
   }
 
-  /** The pinhole camera of this moment for a picture of width x height pixels. */
+  /** The current pinhole camera for a frame of width x height pixels. */
   view(width: number, height: number): Camera {
     return cameraOfPose(this.#camera.now, this.viewerFrame, width, height, nearPlane(this.#bounds));
   }
 
   /**
-   * New attributes. What was not set keeps the place that a person may have given it.
-   * @param set what the page has set, be it to the value that it had
+   * Applies new attributes. Unset components keep the pose that a visitor may have chosen.
+   * @param set Attributes that the page has set, even to the same value.
    */
   applySettings(settings: CameraSettings, set: ReadonlySet<keyof CameraSettings> = new Set()): void {
     const old = this.#settings;
@@ -142,14 +145,14 @@ export class CameraController {
     this.#onChange();
   }
 
-  /** A new scene: the camera stands where the attributes ask, at once. */
+  /** Frames a new scene: the camera moves at once to the pose of the attributes. */
   frame(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
     this.#isTouched = this.#isTurned = false;
     this.#reframe('automatic');
   }
 
-  /** More of the scene is known: the camera goes where it would have stood, unless a person has moved it. */
+  /** Updates the bounds: the camera moves to the resulting pose, unless a visitor has moved it. */
   refine(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
     this.#limit();
@@ -161,7 +164,7 @@ export class CameraController {
     this.#onChange();
   }
 
-  /** A new shape of the picture: an automatic distance follows, at once. */
+  /** Applies a new aspect ratio: an automatic distance follows at once. */
   setAspect(aspect: number): void {
     if (aspect === this.#aspect) return;
     this.#aspect = aspect;
@@ -173,7 +176,7 @@ export class CameraController {
     this.jumpToGoal();
   }
 
-  /** Where the attributes put the camera, whatever a person did since. */
+  /** Returns to the pose of the attributes. */
   reset(source: CameraChangeSource): void {
     this.#source = source;
     this.#userDistance = this.#isTouched = false;
@@ -190,38 +193,38 @@ export class CameraController {
     this.#onChange();
   }
 
-  /** A person turns the camera, angles in radians. */
+  /** Orbits by a visitor's input, angles in radians. */
   orbitBy(theta: number, phi: number): void {
     this.#camera.orbitBy(theta, phi);
     this.#moveByUser();
   }
 
-  /** A person looks around from where the camera is, angles in radians. */
+  /** Looks around from the current position by a visitor's input, angles in radians. */
   lookBy(theta: number, phi: number): void {
     this.#camera.lookBy(theta, phi);
     this.#moveByUser();
   }
 
-  /** A person flies: world units along the camera's own axes. */
+  /** Flies by a visitor's input: world units along the camera's own axes. */
   moveBy(right: number, up: number, forward: number): void {
     this.#camera.moveBy(right, up, forward);
     this.#moveByUser();
   }
 
-  /** A person walks: puts the eye at a point of viewer space. Limits of the target do not apply to it. */
+  /** Walks by a visitor's input: moves the eye to a point of viewer space. Limits of the target do not apply to it. */
   walkTo(eye: Vector3): void {
     this.#camera.setEye(eye);
     this.#moveByUser();
   }
 
-  /** Looks straight ahead, at once: the pose of somebody who begins to walk. */
+  /** Levels the view at once: the initial pose of a walker. */
   level(): void {
     const { phi } = this.#camera.goal;
     this.#camera.lookBy(0, Math.PI / 2 - phi);
     this.jumpToGoal();
   }
 
-  /** A person changes the distance by a factor. @returns false at the limit */
+  /** Changes the distance by a factor from a visitor's input. @returns False at the limit. */
   zoomBy(factor: number): boolean {
     const { radius } = this.#camera.goal;
     this.#camera.zoomBy(factor);
@@ -231,7 +234,7 @@ export class CameraController {
     return true;
   }
 
-  /** A person moves the camera sideways, in shares of the picture's height. */
+  /** Pans by a visitor's input, in fractions of the frame's height. */
   panBy(right: number, up: number): void {
     const { x, y, z } = this.#camera.goal;
     this.#camera.panBy(right, up);
@@ -239,15 +242,15 @@ export class CameraController {
     this.#moveByUser();
   }
 
-  /** A person picks another point to turn around: viewer space. */
+  /** Sets the orbit target that a visitor picks, in viewer space. */
   aimAt([x, y, z]: Vector3): void {
     this.#camera.setGoal({ x, y, z });
     this.#moveByUser();
   }
 
   /**
-   * The element itself turns the camera, radians; nothing is damped.
-   * @returns how far the limits let it
+   * Rotates the camera automatically, radians, without damping.
+   * @returns The angle within the limits.
    */
   turnBy(theta: number): number {
     const turned = this.#camera.turnBy(theta);
@@ -259,10 +262,10 @@ export class CameraController {
   }
 
   /**
-   * Moves on to the time `now`.
+   * Advances to the time `now`.
    * @param now requestAnimationFrame's clock, ms.
-   * @param decayMs time constant of the motion; 0 jumps.
-   * @returns who moved the camera since the last step, or null if nothing did.
+   * @param decayMs Time constant of the motion; 0 jumps.
+   * @returns The source of the camera change since the last step, or null without a change.
    */
   step(now: number, decayMs: number): CameraChangeSource | null {
     const stepMs = this.#lastStep === undefined ? FIRST_STEP_MS : Math.min(MAX_STEP_MS, now - this.#lastStep);
@@ -273,7 +276,10 @@ export class CameraController {
     return changed ? this.#source : null;
   }
 
-  /** Keeps the target in the ball that is framed, so that no pan loses the scene. One that was farther out stays where it was. Limits that the page has set count alone. */
+  /**
+   * Keeps the target in the framing sphere, so that no pan loses the scene. A target that was farther out keeps its
+   * distance. Limits of the page replace this one.
+   */
   #keepNear(before: Vector3): void {
     const { minTarget, maxTarget } = this.#settings;
     if (this.#camera.pivot === 'eye' || [...minTarget, ...maxTarget].some((limit) => limit !== 'auto')) return;

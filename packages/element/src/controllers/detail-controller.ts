@@ -6,46 +6,58 @@ import { buildLevels } from '../detail/build-levels.js';
 import { LatestTask } from '../latest-task.js';
 import type { Services } from '../stage-host.js';
 
-/** Splats of a scene from which on levels are worth building unasked: below, what is slow is not the number of splats. */
+/**
+ * Minimum number of splats for building levels automatically: in smaller scenes the number of splats is not the
+ * bottleneck.
+ */
 const LEAST_SPLATS = 50_000;
-/** Splats up to which they are built unasked: all of them are read back and merged in the page's memory, some 150 bytes of each. */
+/**
+ * Maximum number of splats for building them automatically: all of them are read back and merged in CPU memory, about
+ * 150 bytes each.
+ */
 const MOST_SPLATS = 8_000_000;
-/** How long pictures must have moved with less than the whole before levels are built, ms: the first frames of a scene, and those after a rest, are often slow. */
+/**
+ * Duration of motion at reduced quality before levels are built, ms: the first frames of a scene, and those after a
+ * rest, are often slow.
+ */
 const MAX_SLOW_MS = 1_500;
-/** Time between two frames of one motion, ms: what is longer is a rest, and does not count. */
+/** Maximum interval between two frames of one motion, ms: longer ones are rests, and do not count. */
 const LONGEST_GAP_MS = 1_000;
 
-/** What the controller needs of its element. */
+/** Interface of the element for the controller. */
 export interface DetailHost {
   readonly attributes: Pick<Attributes, 'detail'>;
   readonly services: Pick<Services, 'sceneLoader'>;
   readonly memoryBudget: number | undefined;
-  /** Another picture is due. */
+  /** Requests another frame. */
   splatsChanged(): void;
   warn(sentence: string): void;
 }
 
-/** Sees to levels of detail: built when the page asks for them, or when pictures in motion cannot be drawn whole; and drawn as far as the page allows. */
+/**
+ * Manages levels of detail: builds them when the page requests it, or when frames in motion cannot be drawn at full
+ * quality; and sets the allowed error.
+ */
 export class DetailController {
   readonly #host: DetailHost;
   #scene: LoadedGaussians | null = null;
-  /** What a streamed scene came with. */
+  /** Levels of a streamed scene. */
   #own: LodSettings = {};
-  /** Splats whose levels are there, on their way, or not to be had. */
+  /** Splats whose levels are built, in progress, or impossible. */
   #of: OwnedGaussians | undefined;
   readonly #building = new LatestTask();
   #choice: DetailChoice = 'auto';
   #isPressed = false;
-  /** How long pictures have moved with less than the whole, ms. */
+  /** Accumulated motion at reduced quality, ms. */
   #slowMs = 0;
-  /** When the last picture in motion was told of. */
+  /** Time of the last reported frame in motion. */
   #noted = 0;
 
   constructor(host: DetailHost) {
     this.#host = host;
   }
 
-  /** Looks at the scene that is on show whole, or null for none, and at the attribute. Safe to call as often as one likes. */
+  /** Applies the completely loaded scene, or null for none, and the attribute. May be called at any rate. */
   update(scene: LoadedGaussians | null): void {
     if (scene !== this.#scene) this.#begin(scene);
     if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
@@ -56,7 +68,7 @@ export class DetailController {
     this.#build(scene);
   }
 
-  /** Tells of each picture in motion whether it was drawn whole. */
+  /** Reports each frame in motion, and whether it was drawn at full quality. */
   reportMotionFrame(isWhole: boolean): void {
     const gap = performance.now() - this.#noted;
     this.#noted += gap;
@@ -81,7 +93,7 @@ export class DetailController {
     this.#of = undefined;
   }
 
-  /** Lets pictures be off by so much from now on. */
+  /** Sets the allowed error of subsequent frames. */
   #setThreshold(scene: LoadedGaussians, choice: DetailChoice): void {
     if (choice === this.#choice) return;
     this.#choice = choice;
@@ -106,14 +118,14 @@ export class DetailController {
     this.#building.run(
       async (signal) => {
         const levels = await buildLevels(scene, this.#host.services.sceneLoader, this.#host.memoryBudget, signal);
-        // A sequence may have put other splats in their place meanwhile.
+        // A sequence may have replaced the splats meanwhile.
         if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
         scene.setLevels(levels);
         this.#host.splatsChanged();
       },
       (error) => {
         if (scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
-        // Code that could not be fetched is asked for again at the next update.
+        // If loading the code failed, the next update tries again.
         if (error instanceof GaussianSplatError && error.code === 'network/unreachable') this.#of = undefined;
         const reason = error instanceof Error ? error.message : String(error);
         this.#host.warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);

@@ -8,100 +8,103 @@ import { lossesOf } from '../dynamic-quality/image-loss.js';
 import { quantile } from '../dynamic-quality/display-interval.js';
 import { INITIAL_QUALITY, waitForRest, type QualityState, type QualityReason } from '../dynamic-quality/start.js';
 
-/** All that frames in motion may be drawn with. */
+/** All settings of frames in motion. */
 export const MOVING_SETTINGS: readonly Partial<PerFrameSettings>[] = QUALITY_LEVELS.flatMap(
   ({ settings }) => settings ?? [],
 );
 
-/** A change so soon after another, ms, belongs to the same motion. */
+/** Two changes within this time, ms, belong to the same motion. */
 const MOTION_MS = 150;
-/** Where frames take longer than that, a change within so many of them still does; at most ms. */
+/** For slow frames, two changes within this many frames do, too; upper limit in ms. */
 const FRAMES_OF_MOTION = 2;
 const LONGEST_PAUSE_MS = 2_000;
 
-/** Images of so many times the pixels are others: what levels take is measured anew. */
+/** Images that differ in pixels by this factor invalidate the measured times. */
 const OTHER_SIZE = 1.25;
 
-/** How a frame is to be drawn. */
+/** Settings of the next frame. */
 export interface FramePlan {
-  /** Number of the level; 0 is the whole image. */
+  /** Index of the level; 0 is full quality. */
   readonly level: number;
   readonly settings: Partial<PerFrameSettings> | undefined;
-  /** Number of the size that pictures have. */
+  /** Counter of the frame size. */
   readonly size: number;
 }
 
-/** What is known of a frame before it is drawn. */
+/** State of a frame before it is drawn. */
 export interface FrameOccasion {
   /** requestAnimationFrame's clock, ms. */
   readonly now: number;
-  /** Of the whole picture. */
+  /** Pixels at full resolution. */
   readonly pixels: number;
-  /** It shows something else than the frame before: the camera has moved, or the scene has. */
+  /** Whether it differs from the previous frame: the camera has moved, or the scene has. */
   readonly hasChanged: boolean;
-  /** The camera will go on moving. */
+  /** Whether the camera will continue to move. */
   readonly goesOn: boolean;
 }
 
-/** Draws the frame. @param onTime gets what it took */
+/** Draws the frame. @param onTime Is called with its duration. */
 export type DrawFrame = (settings: FramePlan['settings'], onTime?: (time: WorkTime) => void) => void;
 
-/** What the controller says about itself. */
+/** State of the controller for statistics. */
 export interface DynamicQualityReport {
-  /** Name of the level that the last frame was drawn with; `whole` is the image at rest. */
+  /** Name of the level of the last frame; `whole` is full quality. */
   readonly drawn: string;
   /** Name of the level of frames in motion. */
   readonly moving: string;
-  /** Why: see {@link QualityReason}. */
+  /** Reason: see {@link QualityReason}. */
   readonly reason: QualityReason;
-  /** Median of the last frames on that level, ms: from when a frame could begin until its work was done; null while there are none. */
+  /**
+   * Median of the last frames on that level, ms: from the earliest start of a frame until its work was done; null
+   * without any.
+   */
   readonly frameMs: number | null;
-  /** The last frame that was timed, at rest or in motion, ms; null while there is none, and with a chosen quality. */
+  /** The last timed frame, at rest or in motion, ms; null without one, and with a fixed quality. */
   readonly lastMs: number | null;
-  /** What a frame may take, ms. */
+  /** Target duration of a frame, ms. */
   readonly targetMs: number;
 }
 
 export interface DynamicQualityOptions {
-  /** False where the page has chosen a quality. */
+  /** False if the page has set a fixed quality. */
   readonly isOn: () => boolean;
   readonly scheduler: () => FrameScheduler;
-  /** What the page allows a frame, ms; infinite where the display says. */
+  /** Upper limit of a frame from the page, ms; infinite if only the display limits it. */
   readonly frameBudget: () => number;
   readonly requestFrame: () => void;
-  /** False where frames cost more than to be drawn: those of a post-processor. */
+  /** False if drawing again is expensive: for frames of a post-processor. */
   readonly mayFade: () => boolean;
-  /** Called for each frame of a motion that was timed: whether such are drawn whole. */
+  /** Called for each timed frame of a motion: whether frames are drawn at full quality. */
   readonly onFrameTimed: (isWhole: boolean) => void;
   /** Default: the element's. */
   readonly levels?: readonly QualityLevel[];
 }
 
 /**
- * Keeps moving pictures in time with the display: measures what frames take, and draws those in motion with as much as there is time for. A picture at
- * rest is the true image, 300 ms after the last motion where that takes 214 ms or less at 60 Hz.
+ * Keeps frames in motion in time with the display: measures frame times, and adapts the quality of frames in motion. At
+ * rest it draws the full-quality image, 300 ms after the last motion if that takes 214 ms or less at 60 Hz.
  */
 export class DynamicQualityController {
   readonly #options: DynamicQualityOptions;
   #state: QualityState = INITIAL_QUALITY;
   readonly #all: readonly QualityLevel[];
-  /** Those that serve the image's size. */
+  /** Levels for the image's size. */
   #levels: readonly QualityLevel[];
-  /** Of the pictures that the pace has measured. */
+  /** Pixels of the measured frames. */
   #pixels = 0;
-  /** How many sizes pictures have had: frames of another one come late. */
+  /** Counter of frame sizes, because times of another size arrive late. */
   #size = 0;
   #changedAt = -Infinity;
   #drawn: QualityLevel;
-  /** What the last frame took, of those that are known. */
+  /** Duration of the last timed frame. */
   #lastMs: number | null = null;
-  /** What the last true image took, of those that are known. */
+  /** Duration of the last timed full-quality image. */
   #wholeMs = 0;
   #restTimer: ReturnType<typeof setTimeout> | undefined;
   readonly #fade = new Fade();
-  /** What fewer pixels lose of the scene as it was last seen; undefined while that is not known. */
+  /** Error of lower resolutions in the current view; undefined until it is measured. */
   #losses: Losses | undefined;
-  /** The search for it that goes on. */
+  /** The running measurement of it. */
   #measuring: Promise<Losses> | undefined;
 
   constructor(options: DynamicQualityOptions) {
@@ -110,7 +113,7 @@ export class DynamicQualityController {
     this.#drawn = this.#all[0];
   }
 
-  /** What a frame may take on the GPU, ms. */
+  /** Target GPU duration of a frame, ms. */
   get targetMs(): number {
     return targetMsOf(this.#options.frameBudget(), this.#options.scheduler());
   }
@@ -129,8 +132,9 @@ export class DynamicQualityController {
   }
 
   /**
-   * Draws the next frame on a canvas. Coming to rest from fewer pixels, the last frame of the motion is drawn once more, since only what a task has drawn can be copied; the true
-   * image, which follows, fades in from under the copy.
+   * Draws the next frame on a canvas. Before the first full-quality image after a motion at lower resolution, the last
+   * frame of the motion is drawn once more, because only a frame of the current task can be copied; the full-quality
+   * image then fades in under the copy.
    */
   draw(occasion: FrameOccasion, canvas: HTMLCanvasElement, render: DrawFrame): void {
     if (!this.#options.isOn()) {
@@ -141,7 +145,7 @@ export class DynamicQualityController {
     const plan = this.plan(occasion);
     if (occasion.hasChanged || !this.#options.mayFade()) this.#fade.end();
     else if (plan.level === 0 && before.scale < 1 && this.#settle(before, canvas, render)) return;
-    // All pixels while it is not known what fewer lose.
+    // Uses full resolution until the error of lower ones is known.
     const isUnknown = this.#drawn.scale < 1 && !this.#losses;
     if (isUnknown) this.#drawn = this.#levels.findLast(({ scale }) => scale === 1)!;
     render(this.#drawn.settings, (time) => {
@@ -152,7 +156,7 @@ export class DynamicQualityController {
     if (isUnknown || (plan.level === 0 && this.#state.level > 0)) this.#measure(canvas, occasion.pixels);
   }
 
-  /** @returns whether the frame was one more of the motion */
+  /** @returns Whether the frame was another one of the motion. */
   #settle(before: QualityLevel, canvas: HTMLCanvasElement, render: DrawFrame): boolean {
     if (this.#fade.isCovering || !canFade(canvas)) return false;
     this.#drawn = before;
@@ -161,7 +165,7 @@ export class DynamicQualityController {
     return true;
   }
 
-  /** Finds what fewer pixels lose of the frame just drawn. Where that cannot be found all levels serve. */
+  /** Measures the error of lower resolutions for the last frame. If that fails, all levels are used. */
   #measure(canvas: HTMLCanvasElement, pixels: number): void {
     const scales = this.#all.flatMap(({ scale }) => (scale < 1 ? scale : []));
     const measuring = lossesOf(canvas, scales).catch((): Losses => new Map());
@@ -175,17 +179,18 @@ export class DynamicQualityController {
   }
 
   /**
-   * How to draw the next frame. A single change after a rest is drawn whole at once; what goes on to change is in motion.
+   * Plans the next frame. A single change after a rest is drawn at full quality at once; continued changes are motion.
    */
   plan({ now, pixels, hasChanged, goesOn }: FrameOccasion): FramePlan {
-    // What was found before the page chose a quality says nothing of what is drawn now.
+    // Measurements from before a fixed quality are discarded.
     if (!this.#options.isOn()) this.reset();
     this.#fit(pixels);
     const pause = Math.max(
       MOTION_MS,
       Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs ?? 0, this.#wholeMs)),
     );
-    // Between two changes of one motion (a sequence of fewer pictures than the display's) what is drawn for other reasons is a part of it, until rest is due.
+    // Frames for other reasons between two changes of one motion (a sequence with a lower frame rate than the
+    // display's) belong to it, until rest is due.
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
     const level = isMotion ? this.#state.level : 0;
@@ -214,11 +219,11 @@ export class DynamicQualityController {
     this.#options.requestFrame();
   };
 
-  /** What a frame took that was drawn by a plan. */
+  /** Records the duration of a planned frame. */
   sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, atLeast, atMost }: WorkTime): void {
     if (!this.#options.isOn() || size !== this.#size) return;
     const { targetMs } = this;
-    // What is in time at most, or too slow at least, is known well enough.
+    // If only the bounds are known, they suffice: at most in time, or at least too slow.
     if (atMost > targetMs && atLeast <= targetMs && atLeast < atMost) return;
     const milliseconds = atMost > targetMs ? atLeast : atMost;
     this.#lastMs = milliseconds;
@@ -228,7 +233,7 @@ export class DynamicQualityController {
     if (isWhole || level > 0) this.#options.onFrameTimed(isWhole);
   }
 
-  /** Another scene, or another way to draw it: nothing is known. */
+  /** Discards all measurements: the scene or the backend has changed. */
   reset(): void {
     this.stop();
     this.#state = INITIAL_QUALITY;
@@ -239,7 +244,7 @@ export class DynamicQualityController {
     this.#losses = this.#measuring = undefined;
   }
 
-  /** No frame follows. */
+  /** Call when no frame follows. */
   stop(): void {
     this.#cancelRest();
     this.#fade.end();

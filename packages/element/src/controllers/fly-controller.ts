@@ -3,18 +3,18 @@ import type { CameraController } from './camera-controller.js';
 import { MAX_MOVER_STEP_MS, type Mover } from './motion.js';
 
 export interface FlyHost {
-  /** World units that count as one are the size of the scene. */
+  /** One unit is the size of the scene. */
   readonly camera: Pick<CameraController, 'bounds'>;
   readonly surface: HTMLElement | null;
   readonly mayFly: boolean;
-  /** A person's keys move the camera. */
+  /** Moves the camera by a visitor's keys. */
   flyBy(right: number, up: number, forward: number): void;
   requestFrame(): void;
 }
 
 type Direction = readonly [right: number, up: number, forward: number];
 
-/** By the keys' places, so that they lie under the left hand on every keyboard. */
+/** Keyed by physical position, so that they lie under the left hand on every keyboard. */
 const DIRECTIONS: Readonly<Record<string, Direction>> = {
   KeyW: [0, 0, 1],
   KeyS: [0, 0, -1],
@@ -23,10 +23,10 @@ const DIRECTIONS: Readonly<Record<string, Direction>> = {
   KeyE: [0, 1, 0],
   KeyQ: [0, -1, 0],
 };
-/** Sizes of the scene in a second. */
+/** Sizes of the scene per second. */
 const SPEED = 0.5;
 const FAST = 4;
-/** What a short press is worth at least, ms. */
+/** Minimum duration of a short press, ms. */
 const FIRST_STEP_MS = 50;
 
 /** Flies while keys are held: W and S, A and D, Q and E; with Shift faster. */
@@ -78,7 +78,7 @@ export class FlyController implements ReactiveController, Mover {
     if (direction === undefined || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     this.#isFast = event.shiftKey;
-    // A short press may be over before the next frame.
+    // A short press may end before the next frame.
     if (!event.repeat) this.#move(direction, FIRST_STEP_MS);
     this.#held.set(event.code, direction);
     this.#of.requestFrame();
@@ -87,7 +87,7 @@ export class FlyController implements ReactiveController, Mover {
   readonly #onUp = (event: KeyboardEvent): void => {
     this.#isFast = event.shiftKey;
     this.#held.delete(event.code);
-    // macOS tells nothing of keys that are released beside this one.
+    // macOS does not report the release of keys while this one is held.
     if (event.key === 'Meta') this.#held.clear();
     if (this.#held.size === 0) this.#lastStep = undefined;
   };

@@ -48,22 +48,22 @@ export interface HotspotHost {
   readonly camera: Pick<CameraController, 'viewerFrame' | 'bounds'>;
   /** Holds a box for each of {@link HotspotController.names}, in their order, once it is rendered. */
   readonly hotspotLayer: HTMLElement | null;
-  /** Looks into the last frame. Rejects if it is gone. */
+  /** Probes the last frame. Rejects if it is gone. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
   warn(sentence: string): void;
 }
 
-/** A label of the page at a point of the scene, as `queryHotspot` gives it. */
+/** A hotspot at a point of the scene, as returned by `queryHotspot`. */
 export interface HotspotPlace {
   /** Viewer space. */
   readonly position: ScenePoint;
-  /** Direction away from the surface that it belongs to; null where the page gives none. */
+  /** Normal of its surface; null if the page specifies none. */
   readonly normal: ScenePoint | null;
   /** CSS pixels from the element's left and top edge; null while it is behind the camera or nothing is drawn. */
   readonly canvasPosition: { readonly x: number; readonly y: number } | null;
-  /** False where its normal points away from the camera. */
+  /** False if its normal points away from the camera. */
   readonly facingCamera: boolean;
-  /** False where it faces away, is hidden by scenery, or is behind the camera or outside of the frame. */
+  /** False if it faces away, is occluded, or is behind the camera or outside the frame. */
   readonly visible: boolean;
 }
 
@@ -71,23 +71,26 @@ interface Hotspot extends Located {
   readonly elements: readonly HTMLElement[];
   isOccluded: boolean;
   isVisible: boolean;
-  /** One of its elements holds an open panel. */
+  /** Whether one of its elements contains an open panel. */
   hasPanel: boolean;
 }
 
 const PREFIX = 'hotspot-';
-/** A panel of a label may have been opened or closed. */
+/** Events that may open or close a panel of a label. */
 const PANEL_EVENTS = ['toggle', 'fullscreenchange'];
-/** Less light than this from a hotspot, and scenery hides it. */
+/** Transmittance below which a hotspot counts as occluded. */
 const HIDDEN_BELOW = 0.5;
-/** A label on a surface is in front of it by this share of the scene's size: splats are thick. */
+/** Offset of a label in front of its surface, as a fraction of the scene's size, because splats are thick. */
 const IN_FRONT = 0.03;
-/** A label moves when its point has moved by this many device pixels: less is not seen, and each write costs a recalculation of style. */
+/**
+ * A label moves when its point has moved by this many device pixels: less is invisible, and each write causes a style
+ * recalculation.
+ */
 const VISIBLE_MOVE = 0.5;
-/** Least time between two looks at what hides them while the camera moves, ms. */
+/** Minimum interval between two occlusion tests while the camera moves, ms. */
 const PROBE_INTERVAL_MS = 100;
 
-/** Keeps children with `slot="hotspot-…"` at their points of the scene, and fades those that cannot be seen. */
+/** Keeps children with `slot="hotspot-…"` at their points of the scene, and fades invisible ones. */
 export class HotspotController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: HotspotHost;
@@ -96,7 +99,7 @@ export class HotspotController implements ReactiveController {
   #camera: Camera | undefined;
   /** Boxes of the labels, by their elements. */
   readonly #boxes = new WeakMap<Element, LabelBox>();
-  /** What each label was told last. */
+  /** Last visibility reported to each label. */
   readonly #told = new WeakMap<HTMLElement, boolean>();
   #isProbing = false;
   #isStale = false;
@@ -108,7 +111,7 @@ export class HotspotController implements ReactiveController {
     host.addController(this);
   }
 
-  /** Names of the slots that children ask for, each once. */
+  /** Slot names of children, each once. */
   get names(): readonly string[] {
     return [...this.#hotspots.keys()];
   }
@@ -136,14 +139,17 @@ export class HotspotController implements ReactiveController {
     else this.#findPanels();
   }
 
-  /** Labels that hold an open panel: asked when one opens or closes, since a query for each label of each frame takes as long as the frame. */
+  /**
+   * Labels with an open panel, updated when one opens or closes, because a query for each label in each frame takes as
+   * long as the frame.
+   */
   readonly #findPanels = (): void => {
     for (const hotspot of this.#hotspots.values())
       hotspot.hasPanel = hotspot.elements.some((element) => element.querySelector(labelParts.panel) !== null);
     this.#place();
   };
 
-  /** A frame was drawn from this camera. */
+  /** Call after a frame was drawn with this camera. */
   frameDrawn(camera: Camera): void {
     this.#camera = camera;
     if (this.#hotspots.size === 0) return;
@@ -151,13 +157,13 @@ export class HotspotController implements ReactiveController {
     void this.#look();
   }
 
-  /** Nothing is on show any more: labels are gone until the next frame. */
+  /** Hides all labels until the next frame, because the scene is gone. */
   forget(): void {
     this.#camera = undefined;
     this.#place();
   }
 
-  /** Where a hotspot is; null for a name that no child has, or one without a position. */
+  /** Position of a hotspot; null for an unknown name, or one without a position. */
   query(name: string): HotspotPlace | null {
     const hotspot = this.#hotspots.get(name);
     if (!hotspot?.position) return null;
@@ -181,7 +187,7 @@ export class HotspotController implements ReactiveController {
     );
     this.#host.requestUpdate();
     if (before.size + this.#hotspots.size === 0) return;
-    // Where they are now is known once their boxes are.
+    // The positions are available once the boxes are rendered.
     void this.#host.updateComplete.then(() => this.#look());
   }
 
@@ -200,11 +206,11 @@ export class HotspotController implements ReactiveController {
     return { ...fresh, ...before, elements, position, normal, hasPanel };
   }
 
-  /** Moves the boxes to where the last frame has their points, and hides those that are in no frame. */
+  /** Moves the boxes to the points in the last frame, and hides those outside of it. */
   #place(): void {
     const boxes = this.#of.hotspotLayer?.children;
     if (boxes === undefined) return;
-    // All reads come before all writes: each read after a write would be another layout.
+    // All reads precede all writes, because each read after a write would cause another layout.
     const { clientWidth: width, clientHeight: height } = this.#host;
     const leastMove = VISIBLE_MOVE / windowOf(this.#host).devicePixelRatio || 0;
     const view = this.#camera && new LabelView(this.#camera, this.#of.camera.viewerFrame, width, height);
@@ -219,7 +225,7 @@ export class HotspotController implements ReactiveController {
       const box = this.#boxOf(element);
       if (depth > 0) box.moveTo(hotspot, leastMove);
       else box.remove();
-      // Of a label whose point has left the frame a part may still be there to read.
+      // Part of a label whose point has left the frame may still be readable.
       box.show(isOpen, hasPanel);
       this.#tell(hotspot, isOpen && x >= 0 && y >= 0 && x <= width && y <= height);
     }
@@ -242,7 +248,9 @@ export class HotspotController implements ReactiveController {
     }
   }
 
-  /** Asks the GPU, beside the frames and not within them, what hides the hotspots; again if the camera moved meanwhile. */
+  /**
+   * Tests the occlusion of hotspots on the GPU, asynchronously to the frames; repeats it if the camera moved meanwhile.
+   */
   async #look(): Promise<void> {
     this.#isStale = true;
     if (this.#isProbing) return;
@@ -254,7 +262,7 @@ export class HotspotController implements ReactiveController {
         await new Promise((resolve) => setTimeout(resolve, PROBE_INTERVAL_MS));
       }
     } catch {
-      // The frame is gone, with its scene or its device; the next one asks again.
+      // The frame is gone, with its scene or its device; the next one repeats the test.
     } finally {
       this.#isProbing = false;
     }

@@ -20,59 +20,62 @@ export { handsView } from '../hands-view.js';
 export { AnnouncerController } from './announcer-controller.js';
 export { PromptController } from './prompt-controller.js';
 
-/** What people may do. */
+/** Allowed interactions. */
 export interface InputOptions {
   readonly enabled: boolean;
   readonly zoom: boolean;
   readonly pan: boolean;
-  /** A double click or a double tap means something. */
+  /** Whether double clicks and double taps have an effect. */
   readonly tap: boolean;
   /** When the wheel zooms. */
   readonly wheel: WheelZoom;
-  /** CSS touch-action of the picture: which one-finger moves stay the page's. */
+  /** CSS touch-action of the frame: one-finger gestures that are left to the page. */
   readonly touchAction: string;
 }
 
-/** Who hears of it. */
+/** Receiver of the input. */
 export interface InputHost {
-  /** The element that is dragged and focused, once it is rendered. */
+  /** The element for dragging and focus, once it is rendered. */
   readonly surface: HTMLElement | null;
   /** Holds the labels of the page, on which a drag may begin. */
   readonly hotspotLayer: HTMLElement | null;
   /** Read after every update of the element. */
   readonly input: InputOptions;
-  /** @returns false where it moves nothing */
+  /** @returns False if it has no effect. */
   act(action: CameraAction): boolean;
-  /** A double click or a double tap, in CSS pixels of the page. */
+  /** Called for a double click or a double tap, in CSS pixels of the page. */
   pick(clientX: number, clientY: number): void;
-  /** The space bar; false if it means nothing here. */
+  /** Called for the space bar; returns false if it has no effect. */
   toggleMotion(): boolean;
 }
 
 const LEFT_BUTTON = 0;
 const RIGHT_BUTTON = 2;
 
-/** A pointer that is down on the picture. */
+/** A pressed pointer on the frame. */
 interface Pointer extends Point {
   readonly start: Point;
   readonly pans: boolean;
-  /** Whose its moves are: of one finger, and of what begins on a label, this is known only once it has set out. */
+  /** Owner of its moves: for one finger, and for a press on a label, it is undecided until the pointer moves. */
   readonly owner: 'camera' | 'page' | 'undecided';
-  /** From CSS pixels of the page to those of the element, which CSS may have turned. */
+  /** Converts CSS pixels of the page to those of the element, which CSS may have transformed. */
   readonly inBox: (point: Point) => Point;
 }
 
-/** Listens to mouse, pen, touch, wheel and keys on the picture and its labels, and turns them into camera actions. */
+/** Handles mouse, pen, touch, wheel and keys on the frame and its labels, and converts them to camera actions. */
 export class InputController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: InputHost;
   readonly #pointers = new Map<number, Pointer>();
   readonly #doubleTap = new DoubleTap();
-  /** The last pointer was a finger: whether its second tap is a double click, too, differs from browser to browser, and it counts once. */
+  /**
+   * Whether the last pointer was a finger: browsers differ in whether its second tap is also a double click, which must
+   * count once.
+   */
   #isTouch = false;
-  /** CSS pixels that a pointer has gone from where it came down. */
+  /** Distance in CSS pixels of a pointer from its press. */
   #way = 0;
-  /** The space bar meant something when it was pressed. */
+  /** Whether the space bar had an effect when it was pressed. */
   #toggles = false;
   #surface: HTMLElement | null = null;
   #listening: AbortController | undefined;
@@ -85,7 +88,7 @@ export class InputController implements ReactiveController {
     addHandStyles(host.shadowRoot!);
   }
 
-  /** The last pointer that came down was a finger. */
+  /** Whether the last pressed pointer was a finger. */
   get isTouch(): boolean {
     return this.#isTouch;
   }
@@ -110,10 +113,10 @@ export class InputController implements ReactiveController {
     const targets = [this.#surface, layer];
     for (const { style } of targets) style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
     if (!enabled) setSelectable(layer, true);
-    // An element that has left the page is updated once more; the listener of its document would keep it for good.
+    // Lit updates once more after removal. A document listener added then would leak the element.
     if (!enabled || !this.#surface.isConnected) return this.#stop();
     this.#listening ??= this.#listen(this.#surface, targets);
-    // A wheel listener that may prevent scrolling costs the page; it exists only where the wheel zooms.
+    // A wheel listener that may prevent scrolling slows the page, so it exists only if the wheel zooms.
     if (zoom && wheel !== 'none') this.#wheel ??= this.#listenToWheel(targets);
     else this.#stopWheel();
   }
@@ -171,11 +174,11 @@ export class InputController implements ReactiveController {
     const start = positionOf(event);
     const inBox = boxMoves(this.#surface!, start);
     this.#pointers.set(event.pointerId, { ...start, start, pans, owner, inBox });
-    // A label whose pointer is captured would never hear of its click.
+    // A label with a captured pointer would never get its click event.
     if (!isOnLabel) this.#capture(event.pointerId);
   };
 
-  /** Whether the camera may have a pointer that comes down on a label: only what it may not have selects text. */
+  /** Whether a press on a label may move the camera: all others may select text. */
   #takesFromLabel(event: PointerEvent): boolean {
     const own = event.button === RIGHT_BUTTON ? labelParts.withMenu : labelParts.dragged;
     const takes = !event.defaultPrevented && !isWithin(event, own);
@@ -183,19 +186,19 @@ export class InputController implements ReactiveController {
     return takes;
   }
 
-  /** Keeps a drag going outside of the element. */
+  /** Continues a drag outside the element. */
   #capture(pointerId: number): void {
     try {
       this.#surface?.setPointerCapture(pointerId);
     } catch {
-      // The pointer is gone already, or was made by a script; then moves arrive only over the element.
+      // The pointer is gone already, or synthetic; then moves arrive only over the element.
     }
   }
 
   readonly #onMove = (event: PointerEvent): void => {
     const from = this.#pointers.get(event.pointerId);
     const height = this.#surface?.clientHeight ?? 0;
-    // Where a dialog or a menu of the browser had it, nobody said that the button was released.
+    // If a dialog or a menu of the browser was open, the release of the button was not reported.
     if (event.buttons === 0 && event.pointerType === 'mouse') this.#pointers.delete(event.pointerId);
     else if (from !== undefined && height > 0) this.#follow(event, from, height);
   };
@@ -213,11 +216,11 @@ export class InputController implements ReactiveController {
       : from.owner === 'camera'
         ? [from.pans ? panOf(start, end, height) : orbitOf(start, end, height)]
         : [];
-    // A carousel around the scene learns so that the drag is not its own. The browser does nothing by itself on a move.
+    // Prevents a surrounding carousel from dragging. The browser has no default action for a move.
     for (const action of actions) if (this.#perform(action)) event.preventDefault();
   }
 
-  /** Finds out whose a finger is; its drag counts from here on, so that the camera does not jump. */
+  /** Decides the owner of a finger; its drag counts from here on, so that the camera does not jump. */
   #decide({ pointerId, pointerType }: PointerEvent, from: Pointer, to: Point): void {
     if (Math.hypot(to.x - from.x, to.y - from.y) < TOUCH_SLOP) return;
     const isCamera = pointerType !== 'touch' || isCameraDrag(this.#of.input.touchAction, from, to);
@@ -235,7 +238,7 @@ export class InputController implements ReactiveController {
   readonly #onKey = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     if (event.key === ' ') {
-      // Held down it scrolls no page, either.
+      // A held key must not scroll the page, either.
       this.#toggles = event.repeat ? this.#toggles : this.#of.toggleMotion();
       if (this.#toggles) event.preventDefault();
       return;
@@ -252,7 +255,7 @@ export class InputController implements ReactiveController {
     if (this.#of.input.tap) this.#of.pick(clientX, clientY);
   }
 
-  /** What ends a drag is no click: around the scene there may be a link. */
+  /** The end of a drag is not a click, because the scene may be inside a link. */
   readonly #onClick = (event: Event): void => {
     if (this.#way > TOUCH_SLOP) {
       event.preventDefault();
@@ -266,7 +269,7 @@ export class InputController implements ReactiveController {
     if (this.#pointers.size > 0) event.preventDefault();
   };
 
-  /** At the limit the page scrolls. With Ctrl it would zoom, which nobody has asked for. */
+  /** At the limit the page scrolls. With Ctrl the browser would zoom instead, so that is prevented. */
   readonly #onWheel = (event: WheelEvent): void => {
     if (!this.#wheelZooms(event)) return;
     if (this.#of.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
@@ -277,17 +280,20 @@ export class InputController implements ReactiveController {
     if (isWithin(event, labelParts.panel)) return false;
     if (event.ctrlKey || event.metaKey || wheel === 'always') return true;
     if (wheel !== 'auto') return false;
-    // A label may have a box of its own to scroll.
+    // A label may have its own scrollable box.
     if (event.currentTarget !== this.#surface && scrollsAround(event.target as Element, this.#host)) return false;
     return this.#host.matches(':focus-within') || !scrollsAround(this.#host);
   }
 
-  /** The right button pans, so it opens no menu but where a label has something to copy, to save or to follow. */
+  /** The right button pans, so it opens no menu except on a label with content to copy, save or follow. */
   readonly #onContextMenu = (event: Event): void => {
     if (this.#of.input.pan && !isWithin(event, labelParts.withMenu)) event.preventDefault();
   };
 
-  /** Two fingers move the camera, also where one finger scrolls the page; without zoom they are the page's, whose own zoom some people need. */
+  /**
+   * Two fingers move the camera, even if one finger scrolls the page; without zoom they are left to the page, because
+   * some visitors need its zoom.
+   */
   readonly #onTouchMove = (event: TouchEvent): void => {
     if (event.touches.length < 2 || !event.cancelable || isWithin(event, labelParts.panel)) return;
     if (this.#of.input.zoom) event.preventDefault();

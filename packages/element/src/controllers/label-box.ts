@@ -3,15 +3,15 @@ import type { ViewerFrame } from '../camera/orbit.js';
 
 type Point = readonly [x: number, y: number, z: number];
 
-/** A point of viewer space, and what a frame makes of it. */
+/** A point of viewer space, and its position in a frame. */
 export interface Located {
   readonly position: Point | null;
-  /** Direction away from the surface of the label; null for a label that faces every camera. */
+  /** Normal of the label's surface; null for a label that faces every camera. */
   readonly normal: Point | null;
   /** CSS pixels from the left and the top edge of the element. */
   x: number;
   y: number;
-  /** World units along the camera's axis; 0 for what is in front of the near plane, or nowhere. */
+  /** World units along the optical axis; 0 in front of the near plane, or without a position. */
   depth: number;
   facesCamera: boolean;
 }
@@ -25,8 +25,8 @@ export class LabelView {
   readonly #scaleY: number;
 
   /**
-   * @param width of the element, CSS pixels
-   * @param height of the element, CSS pixels
+   * @param width Width of the element, CSS pixels.
+   * @param height Height of the element, CSS pixels.
    */
   constructor(camera: Camera, frame: ViewerFrame, width: number, height: number) {
     const m = camera.worldToCamera;
@@ -39,7 +39,7 @@ export class LabelView {
     this.#scaleY = height / camera.height;
   }
 
-  /** Writes where a label lies. */
+  /** Computes the position of a label. */
   locate(label: Located): void {
     const { position, normal } = label;
     label.depth = 0;
@@ -52,7 +52,7 @@ export class LabelView {
     label.facesCamera = normal === null || this.#toward(normal, x, y, z) < 0;
   }
 
-  /** The eye is the origin of the camera's axes: the direction from the eye to a point is the point itself. */
+  /** The eye is the origin of the camera's axes, so the vector from the eye to a point is the point itself. */
   #toward(normal: Point, x: number, y: number, z: number): number {
     return this.#along(0, normal, 0) * x + this.#along(4, normal, 0) * y + this.#along(8, normal, 0) * z;
   }
@@ -63,7 +63,10 @@ export class LabelView {
   }
 }
 
-/** The box of a label in the element's shadow tree. It is written only when what is seen changes: each write is a recalculation of its style. */
+/**
+ * The box of a label in the element's shadow tree. It is written only for visible changes, because each write causes a
+ * style recalculation.
+ */
 export class LabelBox {
   readonly #element: HTMLElement;
   #x = NaN;
@@ -75,7 +78,7 @@ export class LabelBox {
     this.#element = element;
   }
 
-  /** @param least distance that is seen, CSS pixels */
+  /** @param least Minimum visible distance, CSS pixels. */
   moveTo({ x, y }: Located, least: number): void {
     this.#isPlaced = true;
     if (Math.abs(x - this.#x) < least && Math.abs(y - this.#y) < least) return;
@@ -84,12 +87,12 @@ export class LabelBox {
     this.#element.style.transform = `translate(${x.toFixed(2)}px, ${y.toFixed(2)}px) translate(-50%, -50%)`;
   }
 
-  /** The label is in no frame. */
+  /** Hides the label, which is outside the frame. */
   remove(): void {
     this.#isPlaced = false;
   }
 
-  /** @param holdsPanel a hidden label with an open panel can still be used */
+  /** @param holdsPanel Whether an open panel keeps a hidden label usable. */
   show(isOpen: boolean, holdsPanel: boolean): void {
     const classes = `hotspot${this.#isPlaced ? ' placed' : ''}${isOpen ? '' : holdsPanel ? ' hidden with-panel' : ' hidden'}`;
     if (classes === this.#classes) return;

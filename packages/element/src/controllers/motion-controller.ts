@@ -1,4 +1,4 @@
-/** Loaded when something moves by itself. */
+/** Loaded when there is automatic motion. */
 import { css, type ReactiveController, type ReactiveControllerHost, type TemplateResult } from 'lit';
 import type { Attributes } from '../attributes.js';
 import { CORNER_STYLES, cornerButton } from '../corner-button.js';
@@ -18,7 +18,7 @@ const STYLES = css`
   }
 `;
 
-/** What the switch says, and its sign. */
+/** Label and icon of the switch. */
 const SIGNS = {
   pause: ['Stop the motion', 'M6 5h4v14H6zM14 5h4v14h-4z'],
   play: ['Start the motion', 'M8 5v14l11-7z'],
@@ -26,18 +26,19 @@ const SIGNS = {
 
 export interface MotionHost {
   readonly attributes: Pick<Attributes, 'autoRotate'>;
-  /** There is a picture to be seen that could move. */
+  /** Whether a frame is shown that could move. */
   readonly isOnShow: boolean;
-  /** What the page asks to play by itself; undefined for nothing. */
+  /** Player of `autoplay`; undefined for none. */
   readonly player: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'> | undefined;
   readonly strings: SpokenStrings;
-  /** Lets the camera turn at once. */
+  /** Starts the rotation at once. */
   startTurning(): void;
 }
 
 /**
- * The visitor's say in what moves without their doing: a camera that turns, a scene that plays by itself. Moving content needs a way to stop it
- * (WCAG 2.2.2), also for those who have neither a keyboard nor the system's wish for less motion. What a script plays is the page's own.
+ * The visitor's control of automatic motion: a rotating camera, a playing scene. Moving content needs a way to stop it
+ * (WCAG 2.2.2), also for visitors without a keyboard or the reduced-motion setting. Playback by scripts is left to the
+ * page.
  */
 export class MotionController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
@@ -51,19 +52,22 @@ export class MotionController implements ReactiveController {
     host.addController(this);
   }
 
-  /** A visitor has stopped what moves by itself. */
+  /** Whether a visitor has stopped automatic motion. */
   get isHeld(): boolean {
     return this.#isHeld;
   }
 
-  /** What the visitor's switch does now; `none` where nothing moves by itself, and in a player, which has a button of its own. */
+  /**
+   * Current action of the visitor's switch; `none` without automatic motion, and in a media player, which has its own
+   * button.
+   */
   get switch(): 'none' | 'pause' | 'play' {
     if (!this.#of.isOnShow || this.#host.slot === 'media' || !(this.#canTurn || this.#canPlay)) return 'none';
     const isPlaying = this.#canPlay && !this.#of.player!.paused;
     return isPlaying || (this.#canTurn && !this.#isHeld) ? 'pause' : 'play';
   }
 
-  /** The visitor's switch; undefined where nothing moves by itself. */
+  /** The visitor's switch; undefined without automatic motion. */
   get view(): TemplateResult | undefined {
     const action = this.switch;
     if (action === 'none') return undefined;
@@ -72,7 +76,7 @@ export class MotionController implements ReactiveController {
     return cornerButton('pause-button', strings[action] ?? word, sign, () => this.toggle(), strings);
   }
 
-  /** The visitor stops all that moves by itself, or lets it move again; false if there is nothing. */
+  /** Stops or resumes all automatic motion for the visitor; false if there is none. */
   toggle(): boolean {
     const action = this.switch;
     if (action === 'none') return false;
@@ -83,7 +87,7 @@ export class MotionController implements ReactiveController {
     return true;
   }
 
-  /** Attributes that are taken away and set again are the page's word, later than the visitor's. */
+  /** Removing and setting the attributes again overrides the visitor's choice. */
   hostUpdated(): void {
     if (!this.#of.attributes.autoRotate && !this.#of.player) this.#isHeld = false;
   }
@@ -92,7 +96,7 @@ export class MotionController implements ReactiveController {
     return this.#of.attributes.autoRotate && !prefersReducedMotion();
   }
 
-  /** Also for people who want less motion, for whom nothing plays by itself: they may want this. */
+  /** Also with reduced motion, because the visitor may want to play it. */
   get #canPlay(): boolean {
     return this.#of.player?.canPlay ?? false;
   }

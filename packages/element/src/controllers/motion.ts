@@ -1,19 +1,19 @@
-/** Something that moves the camera by itself, frame by frame. */
+/** An automatic motion of the camera, frame by frame. */
 export interface Mover {
   /**
-   * Moves on to the moment of a frame.
+   * Advances to the time of a frame.
    * @param now requestAnimationFrame's clock, ms.
-   * @returns whether it wants another frame.
+   * @returns Whether another frame is needed.
    */
   advance(now: number): boolean;
 }
 
-/** Longest step of such a motion, ms: after a pause of the picture it goes on from where it was. */
+/** Longest step of such a motion, ms: after a pause it continues from its last state. */
 export const MAX_MOVER_STEP_MS = 100;
 
-/** True for people who have asked their system for less motion. */
+/** Whether the visitor's system requests reduced motion. */
 export const prefersReducedMotion = (): boolean => reducedMotion().matches;
 
-/** The system's wish for less motion, for those who want to know when it comes or goes; documents of unit tests (jsdom) know of none. */
+/** The media query of reduced motion, for listeners; documents of unit tests (jsdom) do not support it. */
 export const reducedMotion = (): MediaQueryList =>
   globalThis.matchMedia?.('(prefers-reduced-motion: reduce)') ?? new EventTarget();

@@ -1,6 +1,6 @@
 import type { Attributes } from '../attributes.js';
 
-/** What a playback tells its element: names of HTMLMediaElement's events. */
+/** Events of a playback: names of HTMLMediaElement's events. */
 export type PlaybackEvent =
   | 'play'
   | 'playing'
@@ -19,21 +19,21 @@ export type PlaybackEvent =
   | 'emptied';
 
 export interface PlaybackHost {
-  /** `time`: seconds at which a scene begins. */
+  /** `time`: initial position of a scene in seconds. */
   readonly attributes: Pick<Attributes, 'loop' | 'time'>;
-  /** Asks for a frame: while it plays, or after a seek. */
+  /** Requests a frame: while it plays, or after a seek. */
   requestFrame(): void;
   playbackEvent(type: PlaybackEvent): void;
 }
 
-/** Between two timeupdate events while it plays, ms: as browsers have it for video. */
+/** Interval of timeupdate events during playback, ms: as in browsers for video. */
 const UPDATE_INTERVAL_MS = 250;
 
-/** The clock of a scene that moves, with the words and events of HTMLMediaElement. It is asked for the time once a frame. */
+/** The clock of an animated scene, with the interface and events of HTMLMediaElement. It is read once in each frame. */
 export class PlaybackController {
   readonly #host: PlaybackHost;
   #time = 0;
-  /** Where the next scene begins, if somebody has said so: HTML's default playback start position. */
+  /** Start position of the next scene, if set: HTML's default playback start position. */
   #nextStart: number | undefined;
   #duration = NaN;
   #rate = 1;
@@ -42,9 +42,9 @@ export class PlaybackController {
   #seekTarget: number | undefined;
   #lastTick: number | undefined;
   #lastUpdate = -Infinity;
-  /** What the time shows was not there. */
+  /** Whether the frame at the current time was missing. */
   #isWaiting = false;
-  /** Give up waiting to play. */
+  /** Functions that reject pending calls of play. */
   readonly #waits = new Set<(reason: DOMException) => void>();
   #pauses = 0;
 
@@ -52,28 +52,28 @@ export class PlaybackController {
     this.#host = host;
   }
 
-  /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
+  /** Seconds; NaN without an animated scene, Infinity for one without an end. */
   get duration(): number {
     return this.#duration;
   }
 
-  /** True for a scene that moves. */
+  /** Whether there is an animated scene. */
   get canPlay(): boolean {
     return !Number.isNaN(this.#duration);
   }
 
-  /** Where the time is; without a scene that moves, where one will begin. */
+  /** Current position; without an animated scene, the start position of the next one. */
   get currentTime(): number {
     return this.canPlay && this.#nextStart === undefined ? this.#time : this.nextStart;
   }
 
-  /** Where the next scene begins. */
+  /** Start position of the next scene. */
   get nextStart(): number {
     const seconds = Number(this.#host.attributes.time);
     return this.#nextStart ?? (Number.isFinite(seconds) ? Math.max(0, seconds) : 0);
   }
 
-  /** Seeks: events follow once the frame of that time is on show. Before there is a scene this is where it starts. */
+  /** Seeks: events follow once the frame at that time is shown. Without a scene this sets the start position. */
   set currentTime(seconds: number) {
     if (!this.canPlay) {
       this.startNextAt(seconds);
@@ -88,18 +88,18 @@ export class PlaybackController {
     this.#host.requestFrame();
   }
 
-  /** The next scene that moves begins there. A scene that is on show and stays is sought there by {@link keepScene}. */
+  /** Sets the start position of the next animated scene. If the current scene is kept, {@link keepScene} seeks it. */
   startNextAt(seconds: number): void {
     requireFinite(seconds);
     this.#nextStart = Math.max(0, seconds);
   }
 
-  /** No other scene will take the place of the one on show after all. */
+  /** Call if the current scene is kept after all. */
   keepScene(): void {
     if (this.canPlay && this.#nextStart !== undefined) this.currentTime = this.#nextStart;
   }
 
-  /** It begins again at its end. */
+  /** Whether it restarts at its end. */
   get loops(): boolean {
     return this.#host.attributes.loop;
   }
@@ -123,7 +123,7 @@ export class PlaybackController {
   set playbackRate(rate: number) {
     requireFinite(rate, 'playbackRate');
     if (rate === this.#rate) return;
-    // While it stood there were no ticks.
+    // There were no ticks while it was stopped.
     if (this.#rate === 0) this.suspend();
     this.#rate = rate;
     this.#host.playbackEvent('ratechange');
@@ -134,7 +134,7 @@ export class PlaybackController {
     if (!this.#isPaused) return;
     this.#isPaused = false;
     const isReverse = this.#rate < 0;
-    // From the other end, as browsers have it for video.
+    // Continues from the other end, as browsers do for video.
     if (this.#hasEnded || (!this.loops && this.#time === (isReverse ? 0 : this.#duration)))
       this.currentTime = isReverse && Number.isFinite(this.#duration) ? this.#duration : 0;
     this.#host.playbackEvent('play');
@@ -142,12 +142,12 @@ export class PlaybackController {
     this.#host.requestFrame();
   }
 
-  /** How often it was told to {@link pause}. */
+  /** Number of calls of {@link pause}. */
   get pauses(): number {
     return this.#pauses;
   }
 
-  /** Waits for a scene to play. Rejects with an `AbortError` once it need not any more: see {@link stopWaits}. */
+  /** Waits for a scene to play. Rejects with an `AbortError` when the wait is canceled: see {@link stopWaits}. */
   waitFor(ready: Promise<void>): Promise<void> {
     return new Promise((resolve, reject) => {
       this.#waits.add(reject);
@@ -155,7 +155,7 @@ export class PlaybackController {
     });
   }
 
-  /** Takes back every play that waits. */
+  /** Cancels all pending calls of play. */
   stopWaits(): void {
     for (const reject of this.#waits) reject(notPlayed());
   }
@@ -173,7 +173,7 @@ export class PlaybackController {
     this.#host.playbackEvent('pause');
   }
 
-  /** The scene is there, or is there again; NaN: it does not move. */
+  /** Call when the scene is loaded, or loaded again; NaN: it is not animated. */
   setDuration(seconds: number): void {
     if (Object.is(seconds, this.#duration)) return;
     if (!Number.isNaN(seconds)) {
@@ -187,9 +187,9 @@ export class PlaybackController {
   }
 
   /**
-   * Moves on to the moment of a frame.
-   * @param now requestAnimationFrame's clock, ms
-   * @param isLacking what the time shows is not there: it stands until it is
+   * Advances to the time of a frame.
+   * @param now requestAnimationFrame's clock, ms.
+   * @param isLacking Whether the frame at the current time is missing: the clock waits for it.
    */
   tick(now: number, isLacking = false): void {
     if (this.#isPaused || Number.isNaN(this.#duration)) return;
@@ -212,12 +212,12 @@ export class PlaybackController {
     if (this.#rate !== 0) this.#host.requestFrame();
   }
 
-  /** A pause of the picture is not time that passes: nothing is drawn until the next tick. */
+  /** Time does not advance while nothing is drawn, until the next tick. */
   suspend(): void {
     this.#lastTick = undefined;
   }
 
-  /** The scene is gone, or another was asked for, whose time starts anew. */
+  /** Call when the scene is removed, or another was requested, whose time starts again. */
   empty(): void {
     const couldPlay = this.canPlay;
     this.#duration = NaN;
@@ -228,7 +228,7 @@ export class PlaybackController {
     if (couldPlay) this.#host.playbackEvent('durationchange');
   }
 
-  /** The frame of a time is on show. */
+  /** Call when the frame at a time is shown. */
   frameShown(seconds: number): void {
     if (this.#seekTarget === undefined || seconds !== this.#seekTarget) return;
     this.#seekTarget = undefined;
@@ -238,7 +238,7 @@ export class PlaybackController {
 
   #advance(seconds: number): void {
     const next = this.#time + seconds;
-    // While it plays a seek is over as soon as the clock has gone on.
+    // During playback a seek ends as soon as the clock has advanced.
     if (this.#seekTarget !== undefined && seconds !== 0) this.frameShown(this.#seekTarget);
     const isWithin = this.#rate < 0 ? next > 0 && next <= this.#duration : next >= 0 && next < this.#duration;
     if (isWithin) {
@@ -263,6 +263,6 @@ function requireFinite(value: number, name = 'currentTime'): void {
   if (!Number.isFinite(value)) throw new TypeError(`${name} expects a finite number, found ${value}`);
 }
 
-/** Why a scene that was to be played is not. */
+/** Error of a canceled play(). */
 export const notPlayed = (): DOMException =>
   new DOMException('play() was taken back by pause() or another src', 'AbortError');

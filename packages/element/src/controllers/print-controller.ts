@@ -1,11 +1,11 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 
-/** Puts a copy of the picture over the canvas while the page is printed: on paper browsers leave WebGPU canvases out. */
+/** Shows a copy of the frame over the canvas while the page is printed, because browsers omit WebGPU canvases. */
 export class PrintController implements ReactiveController {
   readonly #draw: () => HTMLCanvasElement | null;
   #copy: HTMLCanvasElement | undefined;
 
-  /** @param draw draws a frame now and returns its canvas, null where there is nothing to draw. */
+  /** @param draw Draws a frame synchronously and returns its canvas, null if there is nothing to draw. */
   constructor(host: ReactiveControllerHost, draw: () => HTMLCanvasElement | null) {
     this.#draw = draw;
     host.addController(this);
@@ -26,10 +26,10 @@ export class PrintController implements ReactiveController {
     this.#take();
     const drawn = this.#draw();
     if (drawn === null) return;
-    // With the part's name, so that what a page says of the canvas holds for its copy.
+    // Has the same part name, so that the page's styles of the canvas apply to its copy.
     const copy = drawn.cloneNode() as HTMLCanvasElement;
     copy.getContext('2d')?.drawImage(drawn, 0, 0);
-    // Paper has another width than the window.
+    // Paper differs in width from the window.
     Object.assign(copy.style, { position: 'absolute', inset: '0', objectFit: 'contain' });
     drawn.after(copy);
     this.#copy = copy;

@@ -6,28 +6,28 @@ import type { Mover } from './motion.js';
 export interface PromptHost {
   readonly attributes: Pick<Attributes, 'interactionPromptThreshold'>;
   readonly camera: Pick<CameraController, 'turnBy'>;
-  /** True where a prompt makes sense: the scene is on show, and people can move it. */
+  /** Whether a prompt is useful: the scene is shown, and visitors can move it. */
   readonly mayPrompt: boolean;
-  /** Whether the camera moves to and fro with it. */
+  /** Whether the prompt swings the camera. */
   readonly promptWiggles: boolean;
   requestFrame(): void;
 }
 
-/** How far the camera goes to either side, radians. */
+/** Amplitude of the swing, radians. */
 const WIGGLE_ANGLE = Math.PI / 18;
-/** Once to and fro, twice over; then the prompt stands still: less than 5 s, so that nobody has to look for a way to stop it. */
+/** Two full swings; then the prompt is still. Less than 5 s, so that no control to stop it is required. */
 const WIGGLE_MS = 4_500;
-/** Then it has been seen. */
+/** Time after which it counts as seen. */
 const SHOWN_MS = 5_000;
 
-/** Turn of the camera at a moment of the wiggle, radians: 0 at its start and its end. */
+/** Rotation of the camera at a time of the swing, radians: 0 at its start and its end. */
 export function wiggleAt(elapsedMs: number): number {
   if (elapsedMs <= 0 || elapsedMs >= WIGGLE_MS) return 0;
   const share = elapsedMs / WIGGLE_MS;
   return WIGGLE_ANGLE * Math.sin(4 * Math.PI * share) * Math.sin(Math.PI * share);
 }
 
-/** Shows people who have not touched the scene that they can. */
+/** Shows visitors who have not touched the scene that they can move it. */
 export class PromptController implements ReactiveController, Mover {
   readonly #host: ReactiveControllerHost;
   readonly #of: PromptHost;
@@ -56,12 +56,12 @@ export class PromptController implements ReactiveController, Mover {
     if (this.#state !== 'done') this.#set('idle');
   }
 
-  /** A person has moved the camera, or has seen it long enough, and needs no prompt any more. */
+  /** Call when a visitor has moved the camera, or has seen the prompt long enough. */
   dismiss(): void {
     if (this.#state !== 'done') this.#set('done');
   }
 
-  /** As if nobody had touched the scene yet. */
+  /** Resets to the state before any interaction. */
   reset(): void {
     this.#set('idle');
   }

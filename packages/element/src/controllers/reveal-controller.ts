@@ -3,16 +3,16 @@ import type { Attributes } from '../attributes.js';
 
 export interface RevealHost {
   readonly attributes: Pick<Attributes, 'reveal'>;
-  /** True once there is a picture to reveal. */
+  /** Whether there is a frame to reveal. */
   readonly hasPicture: boolean;
   posterDismissed(): void;
 }
 
-/** Whether the poster covers the scene: until the scene is there, or until the page or a person dismisses it. */
+/** Whether the poster covers the scene: until the scene is shown, or until the page or a visitor dismisses it. */
 export class RevealController {
   readonly #host: ReactiveControllerHost;
   readonly #of: RevealHost;
-  /** What was asked for by a method or a click; until then the attribute decides. */
+  /** Choice by a method or a click; until then the attribute decides. */
   #requested: 'dismissed' | 'shown' | undefined;
   #wasCovered = true;
 
@@ -21,12 +21,12 @@ export class RevealController {
     this.#of = of;
   }
 
-  /** The scene may be seen; a lazy one may therefore be loaded. */
+  /** Whether the scene may be shown, so that a lazy one may be loaded. */
   get mayReveal(): boolean {
     return this.#requested === undefined ? this.#of.attributes.reveal === 'auto' : this.#requested === 'dismissed';
   }
 
-  /** The poster covers the scene. */
+  /** Whether the poster covers the scene. */
   get isCovered(): boolean {
     return !this.mayReveal || !this.#of.hasPicture;
   }
@@ -41,7 +41,7 @@ export class RevealController {
     this.#host.requestUpdate();
   }
 
-  /** Tells of a poster that has gone. Called after every update. */
+  /** Fires the event of a dismissed poster. Called after every update. */
   settle(): void {
     const isCovered = this.isCovered;
     const isGone = this.#wasCovered && !isCovered;

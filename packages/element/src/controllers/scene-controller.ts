@@ -11,33 +11,33 @@ import { isSameContract } from '../loading/same-contract.js';
 import type { Services } from '../stage-host.js';
 import { timerMs } from '../attributes.js';
 
-/** `waiting`: there is a scene to load, but the element is not in sight yet. */
+/** `waiting`: there is a scene to load, but the element has not entered the viewport yet. */
 export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
 
-/** How a scene comes on show: as a `new` one, in place of a preview of it (`whole`), or `again` after a lost device. */
+/** How a scene is shown: as a `new` one, replacing its preview (`whole`), or `again` after a lost device. */
 export type Entrance = 'new' | 'whole' | 'again';
 
-/** What the controller needs of its element, and what it tells it. */
+/** Interface of the element for the controller. */
 export interface SceneHost {
   readonly services: Services;
-  /** Whether anybody would see what there is of a scene while it loads. */
+  /** Whether a preview would be visible while a scene loads. */
   readonly wantsPreviews: boolean;
-  /** Bytes of GPU memory that the scene may take. */
+  /** Upper limit of the scene's GPU memory in bytes. */
   readonly memoryBudget: number | undefined;
-  /** What a generator needs to know beyond the request. */
+  /** Additional data of a request for a generator. */
   readonly liveRequest: ReturnType<OpenOptions['live']>;
-  /** Opens what is no scene of splats. */
+  /** Opens sources other than scenes of splats. */
   readonly open?: typeof openGaussians;
-  /** Shows a scene; fulfils once its first frame is drawn. */
+  /** Shows a scene; resolves once its first frame is drawn. */
   show(scene: LoadedGaussians, entrance: Entrance): Promise<void>;
-  /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
+  /** Called before the current scene is destroyed; `clear` also removes its frame. */
   hide(clear: boolean): void;
-  /** A preview of the scene is on show. */
+  /** Called when a preview of the scene is shown. */
   previewShown(preview: LoadedGaussians): void;
   loadStarted(): void;
   progressed(...progress: Parameters<ProgressListener>): void;
   loaded(url: string): void;
-  /** There is no scene any more, or another is wanted in its place. */
+  /** Called when there is no scene any more, or another replaces it. */
   emptied(): void;
   failed(error: ElementError): void;
   contextChanged(event: 'contextlost' | 'contextrestored'): void;
@@ -45,7 +45,7 @@ export interface SceneHost {
 
 type DeviceBack = (typeof comeBack)['deviceBack'];
 
-/** Why no device is asked for any more, at first. */
+/** The state when no more devices are requested. */
 interface GivenUp {
   readonly signal: AbortSignal;
   readonly error: unknown;
@@ -53,21 +53,23 @@ interface GivenUp {
   readonly mayReturn: boolean;
 }
 
-/** So many failures in a row to bring a lost device back are final. */
+/** Number of consecutive failed recoveries after which the loss is final. */
 const MAX_FAILURES = 2;
-/** Pause before the second try, ms: a GPU process that has just crashed needs a moment. */
+/** Pause before the second try, ms, because a crashed GPU process needs time to restart. */
 const RETRY_DELAY_MS = 1_000;
 
-/** A preview is kept while the whole scene is uploaded if that is so many times as large: both take memory then. */
+/**
+ * A preview stays during the upload of the whole scene if that is larger by this factor, because both take memory then.
+ */
 const MIN_GROWTH = 4;
 
-/** How many more submissions a frame is divided into after each loss, and where that ends: the picture is the same. */
+/** Growth of the number of submissions of a frame after each loss, and its maximum: the image does not change. */
 const SUBMISSIONS_GROWTH = 4;
 const MOST_SUBMISSIONS = 64;
 
 /**
- * Life of the element's scene: load, replace (the latest request wins), recover after the loss of the device, release.
- * What still runs for an older request finds its signal aborted and does nothing.
+ * Life cycle of the element's scene: load, replace (the latest request wins), recover after the loss of the device,
+ * release. Work for an older request finds its signal aborted and has no effect.
  */
 export class SceneController implements ReactiveController {
   readonly #host: ReactiveControllerHost;
@@ -76,19 +78,19 @@ export class SceneController implements ReactiveController {
   #error: ElementError | null = null;
   #scene: LoadedGaussians | null = null;
   #isPreview = false;
-  /** What the scene on show was asked for by. */
+  /** Request of the current scene. */
   #shownRequest: SceneRequest | null = null;
   #request: SceneRequest | null = null;
   readonly #running = new LatestTask();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
   #waiters: (() => void)[] = [];
-  /** Undefined until it has been in sight. */
+  /** Undefined until it has been in the viewport. */
   #isUnseen: boolean | undefined;
-  /** It was dropped out of sight, and is to come back. */
+  /** Whether it was released off-screen, and is to be reloaded. */
   #isAway = false;
-  /** A loss was told that no recovery has answered yet; another scene may do so. */
+  /** Whether a reported loss is still unresolved; another scene may resolve it. */
   #isContextLost = false;
-  /** Grows with every loss of the device: a frame that ran too long for the driver may have been the cause. */
+  /** Grows with every loss of the device, because a frame that ran too long for the driver may have been the cause. */
   #submissions = 1;
 
   constructor(host: ReactiveControllerHost, of: SceneHost) {
@@ -105,32 +107,32 @@ export class SceneController implements ReactiveController {
     return this.#error;
   }
 
-  /** Absolute address of what was asked for last; empty for nothing. */
+  /** Absolute address of the last request; empty for none. */
   get url(): string {
     return this.#request?.url ?? '';
   }
 
-  /** The request of the scene on show; null while there is none. */
+  /** The request of the current scene; null without one. */
   get shownRequest(): SceneRequest | null {
     return this.#scene && !this.isPreview ? this.#shownRequest : null;
   }
 
-  /** The scene on show. */
+  /** The current scene. */
   get scene(): LoadedGaussians | null {
     return this.#scene;
   }
 
-  /** The scene on show is a preview of the one that is being loaded. */
+  /** Whether the current scene is a preview of the one that is being loaded. */
   get isPreview(): boolean {
     return this.#isPreview && this.#scene !== null;
   }
 
-  /** Another scene will take the place of the one on show. */
+  /** Whether another scene will replace the current one. */
   get isOutgoing(): boolean {
     return this.#shownRequest !== this.#request;
   }
 
-  /** Fulfils, and never rejects, once nothing is left to wait for: shown, failed or given up. */
+  /** Resolves, and never rejects, once nothing is pending: shown, failed or abandoned. */
   get settled(): Promise<void> {
     if (this.#state !== 'waiting' && this.#state !== 'loading') return Promise.resolve();
     return new Promise((resolve) => this.#waiters.push(resolve));
@@ -142,8 +144,8 @@ export class SceneController implements ReactiveController {
   }
 
   /**
-   * The scene that ought to be shown, or null for none. Safe to call as often as one likes: only a real change acts.
-   * @param mayStart false while a lazy element is out of sight.
+   * Sets the scene to show, or null for none. May be called at any rate: only changes have an effect.
+   * @param mayStart False while a lazy element is off-screen.
    */
   want(request: SceneRequest | null, mayStart: boolean): void {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
@@ -164,7 +166,10 @@ export class SceneController implements ReactiveController {
     if (this.#state === 'waiting' && mayStart) void this.#load(request);
   }
 
-  /** Whether the scene is in sight. One that has been, and is not any more, may be dropped; it comes back, unnoticed, in sight. */
+  /**
+   * Reports whether the scene is in the viewport. One that has left it may be released; it is reloaded in the viewport
+   * without events.
+   */
   see(isSeen: boolean): void {
     if (!isSeen && this.#isUnseen === undefined) return;
     this.#isUnseen = !isSeen;
@@ -174,8 +179,8 @@ export class SceneController implements ReactiveController {
   }
 
   /**
-   * Gives up: the scene cannot be drawn.
-   * @param clear false keeps the last picture
+   * Stops with an error: the scene cannot be drawn.
+   * @param clear False keeps the last frame.
    */
   fail(error: unknown, clear = true): void {
     this.#running.renew();
@@ -218,7 +223,10 @@ export class SceneController implements ReactiveController {
     void this.#refine();
   }
 
-  /** The same scene with colours as exact as they are asked for now. What is on show stays until they are there, and if they cannot be had. */
+  /**
+   * Reloads the same scene with the requested color precision. The current one stays until it is loaded, or if that
+   * fails.
+   */
   async #refine(): Promise<void> {
     const [request, scene] = [this.#request, this.#scene];
     if (this.#state !== 'ready' || request === null || scene === null || scene.live || isStreamed(request)) return;
@@ -233,7 +241,7 @@ export class SceneController implements ReactiveController {
     }
   }
 
-  /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
+  /** Reloads the scene after its device was lost, with only a pair of events. */
   async #restore(request: SceneRequest, loss: GPUDeviceLostInfo): Promise<void> {
     const signal = this.#running.renew();
     this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
@@ -247,7 +255,10 @@ export class SceneController implements ReactiveController {
     void this.#refine();
   }
 
-  /** No device comes, or none stays. The scene is loaded again once there is one, if it may be and nothing else is asked for. */
+  /**
+   * No device is available, or none lasts. The scene is loaded again once there is one, if allowed and nothing else was
+   * requested.
+   */
   async #giveUp(request: SceneRequest, { signal: given, error, loss, mayReturn }: GivenUp): Promise<void> {
     try {
       const { deviceBack, unrecoverable } = await loadModule(
@@ -293,7 +304,8 @@ export class SceneController implements ReactiveController {
         this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
         if (++failures >= MAX_FAILURES) {
-          // A scene that has been shown is loaded once more, some seconds later; as a new one it then gets no other chance.
+          // A scene that has been shown is loaded once more, some seconds later; as a new one it then gets no other
+          // chance.
           return this.#giveUp(request, { signal, error, loss, mayReturn: !isNew });
         }
         await delay(RETRY_DELAY_MS);
@@ -308,7 +320,7 @@ export class SceneController implements ReactiveController {
     const beforeUpload = (byteLength: number): void => {
       if (signal.aborted) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
-      // A small preview stays on show meanwhile.
+      // A small preview stays meanwhile.
       if (!isSmall) this.#drop(false);
     };
     this.#setReleasable(true);
@@ -329,9 +341,9 @@ export class SceneController implements ReactiveController {
     this.#host.requestUpdate();
     void scene.lost.then((loss) => {
       if (this.#scene !== scene) return;
-      // What will take its place has its own way back.
+      // The scene that replaces it recovers on its own.
       if (this.isOutgoing) this.#drop(false);
-      // What comes back is drawn by what has drawn it.
+      // A recovered scene uses the same backend as before.
       else void this.#restore({ ...(this.#request ?? request), renderer: scene.renderer }, loss);
     });
   }
@@ -341,13 +353,13 @@ export class SceneController implements ReactiveController {
     this.#replace(preview, true);
     void this.#of.show(preview, entrance).then(
       () => this.#scene === preview && this.#of.previewShown(preview),
-      // The whole scene will say what is wrong.
+      // The whole scene will report the error.
       () => undefined,
     );
     this.#host.requestUpdate();
   }
 
-  /** Another scene in place of the one on show, whose picture stays until the first of the new one. */
+  /** Replaces the current scene, whose frame stays until the first of the new one. */
   #replace(scene: LoadedGaussians, isPreview: boolean): void {
     this.#drop(false);
     this.#scene = scene;
@@ -367,11 +379,14 @@ export class SceneController implements ReactiveController {
     this.#of.emptied();
   }
 
-  /** Whether the scene on show may be dropped where others lack its memory: the element is gone, or another scene is to take its place. */
+  /**
+   * Whether the current scene may be released if others need its memory: the element is gone, or another scene is to
+   * replace it.
+   */
   #setReleasable(isSpare: boolean): void {
     if (this.#scene === null) return;
     const { releasable } = this.#scene.place.memory;
-    // What a generator has come to is not to be had again.
+    // The state of a generator cannot be restored.
     const isUnseen = this.#isUnseen && this.#state === 'ready' && !this.#scene.live;
     if (isSpare || this.#releaseTimer || isUnseen)
       releasable.set(this.#giveBack, isUnseen ? this.#scene.gaussians.byteLength : 0);

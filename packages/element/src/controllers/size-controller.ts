@@ -1,10 +1,12 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 
-/** The window that a node is in: that of its document, which may be an `<iframe>`'s or a popup's. Where that has none any more, the page's own. */
+/**
+ * The window of a node: that of its document, which may be an `<iframe>`'s or a popup's. Falls back to the page's own.
+ */
 export const windowOf = ({ ownerDocument }: Node): Window & typeof globalThis =>
   (ownerDocument?.defaultView as (Window & typeof globalThis) | null | undefined) ?? window;
 
-/** Dense displays have 4, and zooming multiplies it by 5 at most. */
+/** Dense displays have 4, and zooming multiplies it by at most 5. */
 const MAX_RATIO = 20;
 
 /** A size in whole device pixels. */
@@ -13,7 +15,7 @@ export interface PixelSize {
   readonly height: number;
 }
 
-/** Knows how many device pixels the picture covers, through resizes, zoom and moves between screens. */
+/** Tracks the device pixels of the frame, through resizes, zoom and moves between screens. */
 export class SizeController implements ReactiveController {
   readonly #canvasOf: () => HTMLCanvasElement | null;
   readonly #onChange: () => void;
@@ -22,7 +24,7 @@ export class SizeController implements ReactiveController {
   #resolution: MediaQueryList | undefined;
   #deviceSize: PixelSize | undefined;
 
-  /** @param canvasOf the canvas, once it is rendered. */
+  /** @param canvasOf Returns the canvas, once it is rendered. */
   constructor(host: ReactiveControllerHost, canvasOf: () => HTMLCanvasElement | null, onChange: () => void) {
     this.#canvasOf = canvasOf;
     this.#onChange = onChange;
@@ -30,9 +32,9 @@ export class SizeController implements ReactiveController {
   }
 
   /**
-   * Size to draw at; null while there is no pixel to draw, or the size is not known yet.
-   * @param maxPixelRatio most drawn pixels for one CSS pixel.
-   * @param maxSide longest side that the device's textures may have, in pixels.
+   * Size to draw at; null while there is no pixel to draw, or the size is unknown.
+   * @param maxPixelRatio Upper limit of device pixels per CSS pixel.
+   * @param maxSide Longest side of the device's textures, in pixels.
    */
   pixelSize(maxPixelRatio: number, maxSide: number): PixelSize | null {
     const { width, height } = this.#deviceSize ?? { width: 0, height: 0 };
@@ -41,13 +43,13 @@ export class SizeController implements ReactiveController {
     return { width: Math.max(1, Math.round(width * shrink)), height: Math.max(1, Math.round(height * shrink)) };
   }
 
-  /** Width / height; 1 while there is none. */
+  /** Width / height; 1 if unknown. */
   get aspect(): number {
     const { width, height } = this.#deviceSize ?? { width: 0, height: 0 };
     return width > 0 && height > 0 ? width / height : 1;
   }
 
-  /** True where there is surely no pixel to draw, as with `display: none`. */
+  /** Whether there is certainly no pixel to draw, as with `display: none`. */
   get isEmpty(): boolean {
     if (this.#canvas === null) return false;
     const { width, height } = this.#deviceSize ?? {
@@ -57,7 +59,7 @@ export class SizeController implements ReactiveController {
     return width === 0 || height === 0;
   }
 
-  /** Device pixels for one CSS pixel; scripts of the page may have replaced it by anything. */
+  /** Device pixels per CSS pixel; scripts of the page may have replaced it by any value. */
   get #pixelRatio(): number {
     const ratio = this.#canvas ? windowOf(this.#canvas).devicePixelRatio : devicePixelRatio;
     return ratio > 0 ? Math.min(ratio, MAX_RATIO) : 1;
@@ -80,7 +82,7 @@ export class SizeController implements ReactiveController {
 
   #observe(): void {
     const canvas = this.#canvasOf();
-    // Another one may have taken its place.
+    // The canvas may have been replaced.
     if (canvas !== this.#canvas) this.hostDisconnected();
     this.#canvas = canvas;
     if (this.#canvas === null || this.#observer !== undefined) return;
@@ -88,10 +90,10 @@ export class SizeController implements ReactiveController {
     if (!ResizeObserver) return this.#setFromCss(this.#canvas.clientWidth, this.#canvas.clientHeight);
     this.#observer = new ResizeObserver((entries) => this.#update(entries[entries.length - 1]));
     try {
-      // Exact device pixels, also where the element's edges lie between them.
+      // Exact device pixels, even if the element's edges lie between them.
       this.#observer.observe(this.#canvas, { box: 'device-pixel-content-box' });
     } catch {
-      // Safari knows no device-pixel box: it gets CSS pixels, and a look-out for changes of the ratio.
+      // Safari does not support device-pixel boxes: it gets CSS pixels, and a listener for changes of the ratio.
       this.#observer.observe(this.#canvas);
       this.#watchResolution();
     }
@@ -100,7 +102,7 @@ export class SizeController implements ReactiveController {
   #update(entry: ResizeObserverEntry): void {
     const exact = entry.devicePixelContentBoxSize?.[0];
     const { width, height } = entry.contentRect;
-    // Under an emulated pixel ratio (DevTools, Playwright) Chromium counts CSS pixels as device pixels.
+    // Under an emulated pixel ratio (DevTools, Playwright) Chromium reports CSS pixels as device pixels.
     const isEmulated =
       this.#pixelRatio !== 1 && exact?.inlineSize === Math.round(width) && exact.blockSize === Math.round(height);
     if (exact && !isEmulated) return this.#set({ width: exact.inlineSize, height: exact.blockSize });

@@ -8,41 +8,41 @@ export interface SourceHost {
   readonly attributes: Attributes;
   readonly services: Services;
   readonly scene: Pick<SceneController, 'want' | 'see' | 'isOther'>;
-  /** Somebody would see the scene. */
+  /** Whether the scene would be visible. */
   readonly isInSight: boolean;
-  /** Whether an element is in the page: those that are not ask for nothing. */
+  /** Whether the element is in the page: others request nothing. */
   readonly isConnected: boolean;
 }
 
-/** What the attributes ask for, and whether it may be loaded yet. */
+/** Determines the source from the attributes, and whether it may be loaded yet. */
 export class SourceController {
   readonly #host: SourceHost;
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
   #addresses = new Addresses();
-  /** A script plays the scene, or waits to: it is loaded wherever it is. */
+  /** Whether a script plays the scene, or waits to: then it is loaded even off-screen. */
   #isWanted = false;
 
   constructor(host: SourceHost) {
     this.#host = host;
   }
 
-  /** Called after every update; only changes act. */
+  /** Called after every update; only changes have an effect. */
   set(source: Source): void {
     this.#source = source;
     this.request();
   }
 
-  /** Loads the scene although nobody may see it, until another is wanted. */
+  /** Loads the scene even if it is off-screen, until another is requested. */
   needNow(isWanted: boolean): void {
     this.#isWanted = isWanted;
   }
 
-  /** Addresses are found anew, as if all had just been set. */
+  /** Resolves addresses again, as if all had just been set. */
   renew(): void {
     this.#addresses = new Addresses();
   }
 
-  /** Asks for the scene of now, and for its bytes if it is time. */
+  /** Requests the current scene, and its bytes if loading may start. */
   request(): void {
     const { attributes, isInSight, isConnected, scene } = this.#host;
     const isSeen = this.#isWanted || isInSight;
@@ -50,12 +50,12 @@ export class SourceController {
     scene.see(isSeen);
   }
 
-  /** Whether a source asks for another scene than the one that is shown or loaded. */
+  /** Whether a source requests another scene than the current or loading one. */
   isOther(source: Source): boolean {
     return this.#host.scene.isOther(this.#requestOf(source));
   }
 
-  /** Addresses of the post-processors that the last source names. */
+  /** Addresses of the post-processors of the last source. */
   get postprocess(): readonly string[] {
     return this.#addresses.postprocess(this.#source.postprocess, this.#host.services.urlModifier);
   }

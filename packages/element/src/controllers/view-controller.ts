@@ -9,7 +9,7 @@ import type { CameraController } from './camera-controller.js';
 import type * as dynamicQuality from './dynamic-quality-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
-/** What the view needs to know of its element. */
+/** Interface of the element for frames. */
 export interface ViewHost extends Contents {
   readonly attributes: Pick<
     Attributes,
@@ -21,20 +21,20 @@ export interface ViewHost extends Contents {
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
   readonly canvas: HTMLCanvasElement | null;
-  /** False where nobody would see a frame. */
+  /** False if a frame would be invisible. */
   readonly isVisible: boolean;
   /** Time constant of the camera's motion, ms. */
   readonly decayMs: number;
-  /** Called once a frame before the camera steps: what moves it by itself does so now. */
+  /** Called once in each frame before the camera steps: automatic motions advance. */
   beforeFrame(now: number): void;
-  /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
+  /** Called once in each frame, before it is drawn, with its camera: animated scenes advance. */
   advanceScene(camera: Camera, now: number): void;
-  /** Called once a frame, after it was submitted, with the camera that it is drawn from. */
+  /** Called once in each frame, after its submission, with its camera. */
   afterFrame(camera: Camera): void;
   cameraChanged(source: CameraChangeSource): void;
-  /** Called for each frame of a motion that was timed: whether such are drawn whole. */
+  /** Called for each timed frame of a motion: whether frames are drawn at full quality. */
   reportMotionFrame(isWhole: boolean): void;
-  /** Drawing has failed for good. */
+  /** Called when drawing has failed permanently. */
   drawingFailed(error: unknown): void;
 }
 
@@ -43,24 +43,24 @@ interface Settle {
   readonly reject: (reason: unknown) => void;
 }
 
-/** Sets the quality while moving; fetched once for all elements. Without it all frames are whole, and none waits for it. */
+/** Adapts the quality while moving; loaded once for all elements. Until then all frames are drawn at full quality. */
 const quality = new Lazy(
   'the code that sets the quality while moving',
   () => import('./dynamic-quality-controller.js'),
 );
 
-/** A scene that is replaced sooner, as a preview may be, needs nothing made for it, ms. */
+/** A scene that is replaced sooner than this, ms, such as a preview, needs no preparation. */
 const PREPARE_AFTER_MS = 300;
 
-/** Draws the scene into the element's canvas, a frame at a time and only when asked. */
+/** Draws the scene to the element's canvas, frame by frame and only on request. */
 export class ViewController implements FrameClient {
   readonly #host: ViewHost;
   #ownPace: dynamicQuality.DynamicQualityController | undefined;
   #painter: Painter | null = null;
-  /** What is drawn into, and the device that it was set up for. */
+  /** The current surface, and its device. */
   #surface: Surface | null = null;
   #surfaceOf: Place['context'] | null = null;
-  /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
+  /** Waits for the first frame of a new scene, which is drawn even off-screen. */
   #first: Settle | undefined;
   #drawnContent = '';
   #preparing: ReturnType<typeof setTimeout> | undefined;
@@ -69,7 +69,7 @@ export class ViewController implements FrameClient {
     this.#host = host;
   }
 
-  /** What frames in motion are drawn with; undefined until its code is there. */
+  /** Quality control of frames in motion; undefined until it is loaded. */
   get #pace(): dynamicQuality.DynamicQualityController | undefined {
     const host = this.#host;
     return (this.#ownPace ??=
@@ -88,7 +88,7 @@ export class ViewController implements FrameClient {
     return this.#host.attributes.quality === 'auto';
   }
 
-  /** What frames at rest and in motion are drawn with. */
+  /** Quality of frames at rest and in motion. */
   get dynamicQuality(): dynamicQuality.DynamicQualityReport {
     const { attributes, scheduler } = this.#host;
     const targetMs = targetMsOf(attributes.frameBudget, scheduler);
@@ -103,19 +103,19 @@ export class ViewController implements FrameClient {
     return this.#pace?.report ?? atStart;
   }
 
-  /** Asks for a frame, if one would be seen. Free to call often. */
+  /** Requests a frame, if it would be visible. May be called at any rate. */
   requestFrame(): void {
     if (this.#isDrawable) this.#host.scheduler.request(this);
   }
 
-  /** What frames are drawn with; null while nothing is. */
+  /** The backend of frames; null without one. */
   get painter(): Painter | null {
     return this.#painter;
   }
 
   /**
-   * Draws what is to be shown from now on, or what has been added to it. Fulfils once the first frame of it is drawn, or at once where there is no pixel to draw;
-   * rejects with GaussianSplatError `out-of-memory/*`.
+   * Draws a new scene, or additions to the current one. Resolves once its first frame is drawn, or at once if there is
+   * no pixel to draw; rejects with GaussianSplatError `out-of-memory/*`.
    */
   show(scene: Drawable): Promise<void> {
     if (scene.place.context !== this.#painter?.place.context) {
@@ -133,11 +133,11 @@ export class ViewController implements FrameClient {
     });
   }
 
-  /** Stops drawing. The last picture stays, so that the next scene can replace it without a gap. */
+  /** Stops drawing. The last frame stays, so that the next scene can replace it without a gap. */
   pause(): void {
     this.#painter?.destroy();
     this.#painter = null;
-    // Nobody need wait for it.
+    // Resolves pending waits.
     this.#first?.resolve();
     this.#first = undefined;
     this.#pace?.stop();
@@ -151,7 +151,7 @@ export class ViewController implements FrameClient {
     this.#surfaceOf = null;
   }
 
-  /** Puts another canvas in the place of one that never shows a picture again: its document has lost its window, or something else draws now. */
+  /** Replaces a canvas that cannot show frames any more: its document has lost its window, or another API draws now. */
   renewCanvas(): void {
     const canvas = this.#host.canvas;
     canvas?.replaceWith(canvas.cloneNode());
@@ -162,11 +162,11 @@ export class ViewController implements FrameClient {
 
   drawFrame(now: number): void {
     const painter = this.#painter;
-    // It may have left the viewport since it asked.
+    // It may have left the viewport since the request.
     if (painter === null || !this.#isDrawable) return;
     const { camera } = this.#host;
     const pixels = this.#pixelsOf(painter);
-    // Without a size nothing is drawn; the observer of the size asks again when there is one.
+    // Nothing is drawn without a size; the size observer requests a frame when there is one.
     if (pixels === null) return this.#finishUnseen();
     this.#host.beforeFrame(now);
     const source = camera.step(now, this.#host.decayMs);
@@ -185,10 +185,11 @@ export class ViewController implements FrameClient {
   }
 
   /**
-   * Draws a frame within the running task, for those who read the canvas before it ends: afterwards a WebGPU canvas is blank to readers.
-   * @param size of the picture; default that of the element
-   * @param background premultiplied, behind the splats
-   * @returns the canvas, or null where there is nothing to draw.
+   * Draws a frame within the current task, for code that reads the canvas before the task ends: afterwards a WebGPU
+   * canvas reads as blank.
+   * @param size Size of the frame; default that of the element.
+   * @param background Premultiplied, behind the splats.
+   * @returns The canvas, or null if there is nothing to draw.
    */
   drawNow(size?: PixelSize, background?: CanvasFrame['background']): HTMLCanvasElement | null {
     const painter = this.#painter;
@@ -203,14 +204,17 @@ export class ViewController implements FrameClient {
     return request.surface.canvas as HTMLCanvasElement;
   }
 
-  /** There is a scene, and somebody sees it or waits for its first frame. A document without a window, as of a frame that was taken away, shows none. */
+  /**
+   * Whether there is a scene that is visible or has a pending first frame. A document without a window, such as that of
+   * a removed frame, shows none.
+   */
   get #isDrawable(): boolean {
     const { canvas, isVisible } = this.#host;
     if (this.#painter?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
     return this.#first !== undefined || isVisible;
   }
 
-  /** null where there is no size. */
+  /** null without a size. */
   #pixelsOf({ place }: Painter): PixelSize | null {
     const { size, attributes } = this.#host;
     return size.pixelSize(attributes.maxPixelRatio, place.limits.maxTextureDimension2D);
@@ -241,7 +245,10 @@ export class ViewController implements FrameClient {
     this.#prepareSoon(painter);
   }
 
-  /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
+  /**
+   * Frames in motion must not wait for pipelines: these are compiled soon after the first frame, and after the quality
+   * changes to `auto`.
+   */
   #prepareSoon(painter: Painter): void {
     if (!this.#isAuto) return;
     quality.want();
@@ -278,11 +285,11 @@ export class ViewController implements FrameClient {
     return { camera: this.#host.camera.view(width, height), surface };
   }
 
-  /** null where the browser shows nothing of the kind on a canvas. */
+  /** null if the browser does not support the context on this canvas. */
   #surfaceFor(painter: Painter): Surface | null {
     const take = (): Surface | null => (this.#surface = painter.surfaceOn(this.#host.canvas!));
     if (this.#surfaceOf !== painter.place.context && take() === null) {
-      // What has drawn on this canvas keeps it.
+      // A canvas keeps its first kind of context.
       this.renewCanvas();
       take();
     }

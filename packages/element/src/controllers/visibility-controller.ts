@@ -2,12 +2,12 @@ import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { windowOf } from './size-controller.js';
 
 /**
- * More than nothing must be visible: with a threshold of 0 an element that only touches the viewport's edge would
- * count, and with a margin elements off screen would take frame time from those on it.
+ * A positive threshold: with 0 an element that only touches the viewport's edge would count, and with a margin
+ * off-screen elements would take frame time from visible ones.
  */
 const THRESHOLD = 1e-5;
 
-/** Knows whether any part of the element is in the viewport. */
+/** Tracks whether any part of the element is in the viewport. */
 export class VisibilityController implements ReactiveController {
   readonly #element: HTMLElement;
   readonly #onChange: () => void;
@@ -25,7 +25,7 @@ export class VisibilityController implements ReactiveController {
     return this.#isVisible === true;
   }
 
-  /** Whether the element is known to be out of view: not before the first report. */
+  /** Whether the element is known to be off-screen: false before the first report. */
   get isKnownHidden(): boolean {
     return this.#isVisible === false;
   }

@@ -1,4 +1,4 @@
-/** Loaded only where levels of detail are asked for, or the GPU is too slow without. */
+/** Loaded only if levels of detail are requested, or the GPU is too slow without. */
 import { DetailedGaussians } from '@gaussian-splat/renderer';
 import { readPacked, type PackedLevels } from '@gaussian-splat/renderer/tools';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -6,10 +6,11 @@ import { buffersOf } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
 /**
- * Builds levels of detail of the splats that a scene has on the GPU, in the worker, and puts them beside these. undefined for a scene
- * that is too small to have any, and where the page refuses workers.
- * @param memoryBudget bytes of GPU memory that the scene and its levels may take together; undefined for no limit but the device's
- * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason
+ * Builds levels of detail for the splats of a scene on the GPU, in the worker, and adds them. undefined for a scene
+ * that is too small for any, and if the page does not allow workers.
+ * @param memoryBudget Upper limit of the GPU memory of the scene and its levels in bytes; undefined for no limit but
+ * the device's.
+ * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason.
  */
 export async function buildLevels(
   scene: LoadedGaussians,
@@ -20,11 +21,11 @@ export async function buildLevels(
   const { device, gaussians } = scene;
   const packed = await readPacked(device, gaussians, () => {
     signal.throwIfAborted();
-    // A sequence frees them when it puts others in their place.
+    // A sequence frees them when it replaces the splats.
     if (scene.gaussians !== gaussians) throw new Error('other splats are shown');
   });
   signal.throwIfAborted();
-  // Its arrays are the worker's afterwards. The page's own thread would stand still for seconds.
+  // Its arrays are transferred to the worker, because the main thread would be blocked for seconds.
   const nothing = async (): Promise<undefined> => undefined;
   const transfer = buffersOf(packed);
   const levels = await loader.ask<PackedLevels | undefined>({ type: 'levels', packed }, signal, nothing, { transfer });

@@ -1,25 +1,27 @@
-/** What displays do that nothing is known of yet, and the slowest that is believed: frames that take too long look like a slow display. */
+/**
+ * Assumed for unknown displays, and the longest accepted interval: frames that take too long look like a slow display.
+ */
 const USUAL_MS = 1000 / 60;
 /** No display is faster. */
 const LEAST_MS = 1;
 const MEMORY = 32;
 const ENOUGH = 8;
-/** Small enough that a frame or two that were late do not matter, large enough for one that came early. */
+/** Low enough to ignore a few late frames, high enough to ignore one early frame. */
 const SHARE = 0.2;
 
-/** The smallest of the values that at least this share of them do not exceed. */
+/** The smallest value that at least this fraction of the values does not exceed. */
 export function quantile(values: readonly number[], share: number): number {
   const sorted = [...values].sort((a, b) => a - b);
   return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
 }
 
-/** The time between two pictures of the display, from requestAnimationFrame's clock. */
+/** Refresh interval of the display, measured by the timestamps of requestAnimationFrame. */
 export class DisplayInterval {
   #steps: number[] = [];
   #last: number | undefined;
   #milliseconds = USUAL_MS;
 
-  /** Milliseconds; those of 60 Hz until enough frames were seen, and at most. */
+  /** Milliseconds; the interval of 60 Hz until enough frames were seen, and never more. */
   get milliseconds(): number {
     return this.#milliseconds;
   }

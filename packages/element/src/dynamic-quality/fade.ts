@@ -1,9 +1,12 @@
-/** How long a frame of fewer pixels fades into the true image, ms: too short to be waited for, and long enough for a change that is not seen as a cut. */
+/**
+ * Duration of the crossfade from a frame with fewer pixels to the full-resolution image, ms: too short for a noticeable
+ * delay, long enough not to look like a cut.
+ */
 export const FADE_MS = 100;
 
 /**
- * Lays the last frame of a motion over the true image, and lets it fade. Both are added with weights whose sum is 1, as view transitions add them, so that what is translucent
- * stays as translucent as it is.
+ * Overlays the full-resolution image with the last frame of a motion and fades it out. The blend weights sum to 1, as
+ * in view transitions, so that translucent pixels keep their alpha.
  */
 export class Fade {
   #overlay: HTMLCanvasElement | undefined;
@@ -20,8 +23,8 @@ export class Fade {
   }
 
   /**
-   * Lays a copy of what was drawn in the running task over a canvas.
-   * @returns a promise that fulfils when it lies there, or when nothing can
+   * Overlays a canvas with a copy of the frame drawn in the current task.
+   * @returns a promise that fulfills when the overlay is shown, or when it cannot be
    */
   async cover(canvas: HTMLCanvasElement): Promise<void> {
     this.end();
@@ -32,7 +35,7 @@ export class Fade {
     if (frame) this.#overlay = overlayOf(canvas, frame);
   }
 
-  /** Begins to fade: the true image is on the canvas. */
+  /** Starts the fade once the canvas shows the full-resolution image. */
   start(canvas: HTMLCanvasElement): void {
     const overlay = this.#overlay;
     if (this.#state !== 'covering') return;
@@ -68,7 +71,7 @@ export function canFade(canvas: HTMLCanvasElement): boolean {
   return opacity === '1' && mixBlendMode === 'normal' && visibility === 'visible';
 }
 
-/** A canvas of the same look, which shows a frame; it takes over its memory. */
+/** A canvas with the same style that shows a frame; it takes over the bitmap's memory. */
 function overlayOf(canvas: HTMLCanvasElement, frame: ImageBitmap): HTMLCanvasElement | undefined {
   const overlay = canvas.ownerDocument.createElement('canvas');
   overlay.setAttribute('part', 'canvas');

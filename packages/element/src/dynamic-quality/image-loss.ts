@@ -1,20 +1,20 @@
 import { addLoss, decibelsOf, type LossSum, type Pixels } from './loss.js';
 
-/** Blocks of the picture that are looked at: across and down at most, and pixels of a side. */
+/** Sampled blocks of the image: maximum number across and down, and side in pixels. */
 const [BLOCKS, SIDE] = [6, 32];
-/** Cells, across and down, by which it is found where the picture shows something. */
+/** Cells across and down of the coverage grid. */
 const CELLS = 64;
 
-/** Where a block lies in the picture. */
+/** Position of a block in the image. */
 interface Block extends Pixels {
   readonly x: number;
   readonly y: number;
 }
 
 /**
- * What frames of fewer pixels lose of a picture, by the share of its pixels across and down: dB over what is covered of blocks that are spread over it. The work is
- * divided into tasks of a few milliseconds.
- * @param canvas whose frame was drawn in the running task
+ * Loss of frames with fewer pixels, by the fraction of pixels across and down: dB over the covered pixels of blocks
+ * spread over the image. The work is split into tasks of a few milliseconds.
+ * @param canvas whose frame was drawn in the current task
  */
 export async function lossesOf(canvas: HTMLCanvasElement, scales: readonly number[]): Promise<Map<number, number>> {
   const blocks = blocksOf(await createImageBitmap(canvas));
@@ -28,7 +28,10 @@ export async function lossesOf(canvas: HTMLCanvasElement, scales: readonly numbe
   return found;
 }
 
-/** Blocks spread over what is covered; closer together where that is little, so that none of it lies in their edges alone, which are not compared. */
+/**
+ * Blocks spread over the covered area, closer together if it is small, so that it does not lie entirely in block edges,
+ * which are not compared.
+ */
 function blocksOf(picture: ImageBitmap): Block[] {
   const { x, y, width, height } = coveredOf(picture);
   const [columns, rows] = [width, height].map((pixels) => Math.min(BLOCKS, Math.ceil((2 * pixels) / SIDE)));
@@ -52,7 +55,7 @@ function blocksOf(picture: ImageBitmap): Block[] {
 const firstOf = (middle: number, pixels: number): number =>
   Math.max(0, Math.min(pixels - SIDE, Math.round(middle - SIDE / 2)));
 
-/** The rectangle of what is covered, to a cell; the whole picture where nothing is. */
+/** The covered rectangle at cell precision; the entire image if nothing is covered. */
 function coveredOf(picture: ImageBitmap): Pick<DOMRect, 'x' | 'y' | 'width' | 'height'> {
   const context = contextOf(CELLS, CELLS);
   context.drawImage(picture, 0, 0, CELLS, CELLS);
@@ -64,7 +67,7 @@ function coveredOf(picture: ImageBitmap): Pick<DOMRect, 'x' | 'y' | 'width' | 'h
   return { x, y, width, height };
 }
 
-/** First pixel and number of pixels from the least of some cells to the greatest. */
+/** First pixel and number of pixels from the smallest cell to the largest. */
 function span(cells: readonly number[], pixels: number): [number, number] {
   if (cells.length === 0) return [0, pixels];
   const [first, last] = [Math.min(...cells), Math.max(...cells)];

@@ -1,4 +1,7 @@
-/** How much of a picture frames of fewer pixels lose: found on the picture itself, since neither the size of splats nor what they cover tells it. */
+/**
+ * Measures the loss of frames with fewer pixels on the image itself, because neither splat sizes nor coverage predict
+ * it.
+ */
 
 /** [height, width, 4] premultiplied, 0..1. */
 export interface Pixels {
@@ -7,21 +10,23 @@ export interface Pixels {
   readonly height: number;
 }
 
-/** Squared errors of what was enlarged, summed over the channels of the pixels that are covered. */
+/** Squared errors of the enlarged image, summed over the channels of the covered pixels. */
 export interface LossSum {
   sum: number;
   values: number;
 }
 
-/** Pixels beside a block of the picture that the cubic reaches at a scale. */
+/** Pixels beside a block that the cubic kernel reaches, at scale 1. */
 const REACH = 2;
-/** Of the pixels of a block each so many across and down is compared. */
+/** Only every STEP-th pixel of a block is compared, across and down. */
 const STEP = 2;
 
 /**
- * Adds what a part of a picture loses at a share of its pixels across and down: samples at the centers of larger pixels, as frames of fewer pixels
- * take them, enlarged by the cubic of Catmull and Rom (shaders/shared/compose.wgsl). Pixels at the edge, to which the cubic reaches from outside, are left out.
- * @param x of the part's first pixel within the picture, y likewise
+ * Adds the loss of a block at a fraction of its pixels across and down: samples at the centers of larger pixels, as in
+ * reduced frames, enlarged by the Catmull-Rom cubic (shaders/shared/compose.wgsl). Pixels at the edge, whose kernel
+ * reaches outside, are skipped.
+ * @param x of the block's first pixel within the image
+ * @param y of the same pixel
  */
 export function addLoss({ values, width, height }: Pixels, scale: number, x: number, y: number, to: LossSum): void {
   const margin = Math.ceil(REACH / scale);
@@ -37,7 +42,7 @@ export function addLoss({ values, width, height }: Pixels, scale: number, x: num
   }
 }
 
-/** Peak 1; Infinity for nothing lost, or nothing seen. */
+/** PSNR with peak 1; Infinity without error or without covered pixels. */
 export const decibelsOf = ({ sum, values }: LossSum): number => (sum > 0 ? -10 * Math.log10(sum / values) : Infinity);
 
 function enlargedAt(
@@ -73,7 +78,7 @@ function cubicWeights(t: number): [number, number, number, number] {
   ];
 }
 
-/** Adds the picture between the centers of its pixels. */
+/** Adds the interpolated image between the centers of its pixels. */
 function addSample(
   values: Float32Array,
   width: number,

@@ -4,60 +4,68 @@ import { quantile } from './display-interval.js';
 import { HOLD_MS, INITIAL_QUALITY, type QualityState, type QualityReason } from './start.js';
 import { inPixels, modelOf, type TimeModel } from './time-model.js';
 
-/** What a frame took. */
+/** The measured time of a frame. */
 export interface FrameSample {
-  /** When that became known, ms on any clock that runs. */
+  /** Arrival of the measurement, ms of any monotonic clock. */
   readonly now: number;
   /** Level that the frame was drawn with. */
   readonly level: number;
   readonly milliseconds: number;
 }
 
-/** What the level is chosen by. */
+/** Parameters of the choice of a level. */
 export interface QualityTargets {
-  /** What a frame may take, ms. */
+  /** Time budget of a frame, ms. */
   readonly targetMs: number;
   /** The first is the whole image; the others lose more and more. */
   readonly levels: readonly QualityLevel[];
 }
 
-/** Frames of which the usual ones count: a slow one now and then is no reason for anything. */
+/** Number of recent frames; the typical ones count, so a single slow frame changes nothing. */
 const MEMORY = 9;
 const ENOUGH = 5;
-/** What takes less cannot be told from nothing, ms. */
+/** Shorter times are indistinguishable from 0, ms. */
 const NOTHING_MS = 0.01;
-/** Fewer, where all of them are too slow. */
+/** Frames needed for a decision if all of them are too slow. */
 const LEAST = 3;
-/** The level is chosen to take this share of the target; it stays up to the other. */
+/** The level is chosen to take the first fraction of the target; it is kept up to the second. */
 const AIM = 0.85;
 const LATE = 1.05;
 /** Levels that take so little longer than the fastest are as good, and more accurate. */
 const AS_FAST = 1.05;
-/** Frames are believed to take longer by so many times in a second at most: what grows faster is another tab, or the page, more often than the scene. */
+/**
+ * Maximum growth per second of the accepted frame time, as a factor: faster growth usually comes from another tab or
+ * the page, not from the scene.
+ */
 const GROWTH = Math.exp(2.8);
-/** Belief begins at this share of the target: after frames that took next to nothing, it would follow slow ones for seconds. */
+/**
+ * Minimum of the accepted frame time as a fraction of the target: after almost empty frames it would lag behind slow
+ * ones for seconds.
+ */
 const LITTLE = 0.04;
-/** Milliseconds between two frames that count for this. */
+/** Upper limit of the time between two frames in that growth, ms. */
 const LONGEST_STEP_MS = 100;
-/** After such a rest, ms, the clock of an idle GPU is low, for so long: frames say little. */
+/**
+ * After a pause of this length, ms, an idle GPU runs at a low clock for the second time: frames are not representative.
+ */
 const REST_MS = 250;
 const WAKING_MS = 400;
-/** Holds are longer by so many times where the last climb was regretted. */
+/** Factor for longer holds if the last upward step had to be undone. */
 const LONGER = 3;
 const LONGEST_HOLD_MS = 60_000;
-/** A fall so late may come sooner. */
+/** Frames later than this factor of the target end a hold early. */
 const FAR_TOO_LATE = 1.25;
-/** After so long without a change, ms, an unknown level is tried that may be in time. */
+/** After this time without a change, ms, an unmeasured level is tried if it may be fast enough. */
 const TRIAL_MS = 6_000;
 
-/** The pace after a frame. Frames of another level are too late to say anything. */
+/** The controller state after a frame. Frames of another level arrive too late and are ignored. */
 export function nextQuality(state: QualityState, sample: FrameSample, rules: QualityTargets): QualityState {
   if (sample.level !== state.level) return state;
   const seen = observe(state, sample, rules);
   return choose(seen, sample.now, rules) ?? seen;
 }
 
-/** With what a frame says of its level and of the load. */
+/** Adds the time of a frame to the measurements of its level and of the load. */
 function observe(
   state: QualityState,
   { now, level, milliseconds }: FrameSample,
@@ -72,21 +80,24 @@ function observe(
   const most = (state.smoothedMs || AIM * targetMs) * GROWTH ** (step / 1000);
   let { measured } = state;
   const load = state.load || usual;
-  // While the memory fills, the load is taken to be that of before the change.
+  // Until the memory is full, the load from before the change is used.
   if (state.recent.length < MEMORY && recent.length >= LEAST)
     measured = { ...measured, [level]: { share: usual / load, at: now, load } };
   const smoothedMs = recent.length < LEAST ? state.smoothedMs : Math.max(LITTLE * targetMs, Math.min(most, usual));
   return { ...state, recent, movedAt, sampledAt: now, load, measured, smoothedMs };
 }
 
-/** Usual time of a frame, ms: the mean of the middle half. The answers for two frames that wait for one another may arrive together, so a median would alternate. */
+/**
+ * Typical time of a frame, ms: the mean of the middle half. The times of two queued frames may arrive together, so a
+ * median would alternate.
+ */
 function usualOf(recent: readonly number[]): number {
   const cut = recent.length >> 2;
   const middle = [...recent].sort((x, y) => x - y).slice(cut, recent.length - cut);
   return middle.reduce((sum, time) => sum + time, 0) / middle.length;
 }
 
-/** The next level, or null where it stays. */
+/** The next level, or null to keep the current one. */
 function choose(state: QualityState, now: number, rules: QualityTargets): QualityState | null {
   const { level, recent, measured } = state;
   if (recent.length < LEAST) return null;
@@ -98,7 +109,7 @@ function choose(state: QualityState, now: number, rules: QualityTargets): Qualit
   return level > 0 ? whereInTime(state, now, times, model, rules) : null;
 }
 
-/** The most accurate level that is predicted in time, else one of the fastest. */
+/** The most accurate level that is predicted to be fast enough, else one of the fastest. */
 function bestOf(times: readonly number[], targetMs: number): number {
   const least = Math.min(...times);
   const within = least <= AIM * targetMs ? AIM * targetMs : Math.max(targetMs, AS_FAST * least);
@@ -116,7 +127,7 @@ function whereLate(
   const { targetMs } = rules;
   const usual = times[level];
   let to = bestOf(times, targetMs);
-  // What is not worth a try must be known to be as fast.
+  // An unmeasured level is not tried here: only a level known to be as fast is chosen.
   if (times[to] * AS_FAST > usual)
     to = bestOf(
       times.map((time, other) => (isKnown[other] ? time : Infinity)),
@@ -131,7 +142,10 @@ function whereLate(
   return change(state, now, to, 'slow', times[to]);
 }
 
-/** Up, where that is predicted in time; after a while without a change, one level up where that may be. */
+/**
+ * Steps up to a level that is predicted to be fast enough; after a while without a change, one level up if that may be
+ * fast enough.
+ */
 function whereInTime(
   state: QualityState,
   now: number,
@@ -143,7 +157,7 @@ function whereInTime(
   const { levels, targetMs } = rules;
   if (recent.length < ENOUGH) return null;
   if (direction === 'down' && now - turnedAt < hold) return null;
-  // What was never measured may take as much as its pixels say.
+  // Upper limit for an unmeasured level: proportional to its pixels.
   const mostOf = (other: number): number =>
     isKnown[other] ? times[other] : (times[level] * inPixels(levels[other], other)) / inPixels(levels[level], level);
   const to = times.findIndex((time, other) => time <= AIM * targetMs && mostOf(other) <= targetMs);
@@ -181,15 +195,18 @@ function change(
   };
 }
 
-/** The pace where other levels serve an image of the same size: what was measured of those that stay counts on. */
+/**
+ * The controller state after the usable levels of an image of the same size change; measurements of the remaining
+ * levels are kept.
+ */
 export function limited(state: QualityState, levels: readonly QualityLevel[]): QualityState {
   const last = levels.length - 1;
   return state.level <= last ? state : { ...state, level: last, recent: [], smoothedMs: 0 };
 }
 
 /**
- * The pace where images have so many times the pixels, and other levels may serve: what was measured says nothing of these. Fewer pixels are drawn with as
- * many of them as before, for they take no longer.
+ * The controller state after the number of pixels changes by a factor and other levels become usable: earlier
+ * measurements do not apply. The new level draws about as many pixels as before, which takes no longer.
  */
 export function resized(state: QualityState, growth: number, levels: readonly QualityLevel[]): QualityState {
   const level = Math.min(state.level, levels.length - 1);

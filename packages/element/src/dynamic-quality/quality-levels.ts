@@ -4,18 +4,18 @@ import { QUALITIES, type PerFrameSettings } from '@gaussian-splat/renderer';
 export interface QualityLevel {
   /** For people. */
   readonly name: string;
-  /** What frames are drawn with; undefined on the first level, where nothing differs from the image at rest. */
+  /** Settings of the frame; undefined on the first level, which equals the image at rest. */
   readonly settings: Partial<PerFrameSettings> | undefined;
-  /** Share of the image's width and height that is drawn. */
+  /** Fraction of the image's width and height that is drawn. */
   readonly scale: number;
 }
 
-/** Shares of the image's width and height: each level has about half the pixels of the one before. */
+/** Fractions of the image's width and height: each level has about half the pixels of the one before. */
 const SCALES = [0.71, 0.5, 0.35, 0.25];
 
 /**
- * Pixels, of those that are drawn, by which levels may be off where there are levels of detail: next to nothing close up, and from afar less than fewer
- * pixels would cost (docs/decisions/0014).
+ * Allowed error of levels of detail, in drawn pixels: hardly any loss in close views, and a smaller one in distant
+ * views than fewer pixels would cause (docs/decisions/0014).
  */
 const [BALANCED_DETAIL, SMALLER_DETAIL] = [0.5, 1];
 
@@ -23,8 +23,9 @@ const { depthKeyBits, transmittanceMin } = QUALITIES.balanced;
 const balanced: Partial<PerFrameSettings> = { depthKeyBits, transmittanceMin, detail: BALANCED_DETAIL };
 
 /**
- * All levels, from the whole image down: the settings of the quality `balanced`, which lose least for what they win, then fewer pixels. Single objects, since
- * the renderer knows settings by them. docs/frontier has the dB and the time of each.
+ * All levels from the full image down: the settings of the quality `balanced`, which save the most time per loss, then
+ * fewer pixels. The objects are shared, because the renderer compares settings by identity. docs/frontier lists the dB
+ * and the time of each.
  */
 export const QUALITY_LEVELS: readonly QualityLevel[] = [
   { name: 'whole', settings: undefined, scale: 1 },
@@ -36,16 +37,22 @@ export const QUALITY_LEVELS: readonly QualityLevel[] = [
   })),
 ];
 
-/** Fewest pixels that a level leaves: the parts of a smaller image have so many splats each that it takes the longer. */
+/** Minimum number of pixels of a level: below it, tiles have too many splats each, and frames take longer. */
 const LEAST_PIXELS = 8192;
 
-/** What shares of a picture's pixels across and down lose of it, dB; of hair and of small subjects half of them lose nearly all. */
+/**
+ * Error of a frame by the fraction of pixels across and down, dB; hair and small subjects lose nearly everything at one
+ * half.
+ */
 export type Losses = ReadonlyMap<number, number>;
 
-/** Levels whose pictures are less like the true one are none: over 10 % of what is covered would be off by more than 16/255 (docs/decisions/0014). */
+/**
+ * Levels below this PSNR are not used: over 10 % of the covered pixels would be off by more than 16/255
+ * (docs/decisions/0014).
+ */
 export const LEAST_DECIBELS = 27;
 
-/** Those of the levels that serve an image of so many pixels, of which fewer pixels lose so much. */
+/** The levels that are usable for an image of this number of pixels and these losses. */
 export const levelsForSize = (
   pixels: number,
   levels: readonly QualityLevel[],

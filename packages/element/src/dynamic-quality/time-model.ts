@@ -1,48 +1,57 @@
-/** What frames on the levels take: `a + b * pixels` on those that are reduced, a time of its own for the whole image, learned from what they took. */
+/**
+ * Learned model of the frame time per level: `a + b * pixels` for reduced levels, and a separate time for the full
+ * image.
+ */
 import type { QualityLevel } from './quality-levels.js';
 
-/** What is supposed until it is measured: the share of a reduced frame that fewer pixels leave, and what the whole image takes beyond a reduced one of as many pixels. */
+/**
+ * Prior until measured: the fixed part of a reduced frame, and the factor of the full image over a reduced one of equal
+ * pixels.
+ */
 const FIXED = 0.2;
 const WHOLE = 1.35;
-/** How much of the supposed slope is kept: as if it had been measured by levels that lie apart by the root of this share of the pixels. */
+/**
+ * Weight of the prior slope: equivalent to measurements of levels whose pixel fractions differ by the square root of
+ * this value.
+ */
 const STIFFNESS = 0.001;
-/** How long a measurement counts, ms, and how long where the load has changed by more than a quarter since. */
+/** Lifetime of a measurement, ms, and after the load has changed by more than a quarter. */
 const KNOWN_MS = 120_000;
 const KNOWN_UNDER_OTHER_LOAD_MS = 5_000;
 const SAME_LOAD = Math.log(1.25);
 
-/** What a level was measured to take. */
+/** A measurement of a level. */
 export interface Measured {
-  /** As a multiple of the load, which all levels have in common. */
+  /** As a multiple of the load that is common to all levels. */
   readonly share: number;
-  /** When, ms, and under which load, ms. */
+  /** Time of the measurement, ms, and the load then, ms. */
   readonly at: number;
   readonly load: number;
 }
 
-/** The levels that were measured, by number. */
+/** Measurements by number of the level. */
 export type MeasuredLevels = Readonly<Record<number, Measured>>;
 
-/** What the levels take as multiples of the load, and which of them were measured. */
+/** Predicted times of the levels as multiples of the load, and which levels were measured. */
 export interface TimeModel {
   readonly shares: readonly number[];
   readonly isKnown: readonly boolean[];
 }
 
-/** What a level takes, as against others, where all of it is in the pixels. */
+/** Relative time of a level if it is proportional to pixels. */
 export const inPixels = ({ scale }: QualityLevel, level: number): number => (level === 0 ? WHOLE : scale ** 2);
 
 const supposed = (pixels: number): number => FIXED + (1 - FIXED) * pixels;
 
-/** What is known of a moment. */
+/** The state of the measurements at one time. */
 export interface Moment {
   readonly now: number;
-  /** The level that is drawn with, which was measured, and the load under which it takes what it does, ms. */
+  /** The current level, which was measured, and the load, ms. */
   readonly level: number;
   readonly load: number;
 }
 
-/** The model of a moment, which says what still counts of what was measured. */
+/** The model at one time, from the measurements that are still valid. */
 export function modelOf(
   levels: readonly QualityLevel[],
   measured: MeasuredLevels,
@@ -66,7 +75,7 @@ export function modelOf(
   return { shares, isKnown };
 }
 
-/** The line of least squares, stiff where the points do not say how steep it is. */
+/** Least-squares line with a prior for a slope that the points do not determine. */
 function lineThrough(points: readonly { x: number; y: number }[], whole?: number): (pixels: number) => number {
   if (points.length === 0) return (pixels) => ((whole ?? 1) / WHOLE) * supposed(pixels);
   const mean = (of: (point: { x: number; y: number }) => number): number =>
@@ -76,7 +85,7 @@ function lineThrough(points: readonly { x: number; y: number }[], whole?: number
   const covariance = points.length * mean((point) => (point.x - x) * (point.y - y));
   const variance = points.length * mean((point) => (point.x - x) ** 2);
   const b = (covariance + STIFFNESS * slope) / (variance + STIFFNESS);
-  // Fewer pixels win no more than in proportion; more of them, where that is so at all, no more than the whole image lets hope.
+  // Fewer pixels save time at most in proportion; more pixels cost at most the prior ratio to the full image.
   const least = Math.min(0, ((whole === undefined ? y / 2 : whole / WHOLE) - y) / Math.max(1 - x, STIFFNESS));
   const held = Math.max(least, Math.min(b, y / x));
   return (pixels) => y + held * (pixels - x);

@@ -1,4 +1,4 @@
-/** The attributes of `<splat-cut>`, each in one place, as those of `<gaussian-splat>` in ../attributes.ts. */
+/** The attributes of `<splat-cut>`, each defined once, as those of `<gaussian-splat>` in ../attributes.ts. */
 import type { Vector3 } from '@gaussian-splat/core';
 import { read } from '../attributes.js';
 import { angleGrammar, keywordGrammar, numberGrammar, parseQuantity, METRES_PER_UNIT } from '../camera/grammar.js';
@@ -7,7 +7,7 @@ import { anglesGrammar, pointGrammar, scaleGrammar } from '../composition/gramma
 
 type Numbers = string | number | readonly number[] | null;
 
-/** What a cut does to the splats on its side. */
+/** Effect of a cut on the splats on its side. */
 export type CutEffect = 'hide' | 'fade' | 'tint' | 'lighten' | 'recolor' | 'displace';
 
 const colorGrammar: AttributeGrammar<Vector3> = {
@@ -16,7 +16,7 @@ const colorGrammar: AttributeGrammar<Vector3> = {
   parse: parseColor,
 };
 
-/** A color of CSS as three numbers 0..1, sRGB-encoded. */
+/** Parses a CSS color to three numbers 0..1, sRGB-encoded. */
 function parseColor(text: string): Vector3 | null {
   const context = document.createElement('canvas').getContext('2d');
   if (!context || !CSS.supports('color', text)) return null;
@@ -41,13 +41,15 @@ const edgeGrammar: AttributeGrammar<number | 'hard'> = {
 
 export const CUT_ATTRIBUTES = {
   /**
-   * `box`, `sphere`, `cylinder` with an upright axis, or `plane`. The first three are 1 m wide and high before `scale`. The inside of a plane is what lies below it.
+   * `box`, `sphere`, `cylinder` with an upright axis, or `plane`. The first three are 1 m wide and high before `scale`.
+   * The inside of a plane is below it.
    * @default `box`
    * @example shape="sphere"
    */
   shape: read<'box' | 'sphere' | 'cylinder' | 'plane'>(keywordGrammar(['box', 'sphere', 'cylinder', 'plane'])),
   /**
-   * Where its middle is: x y z in meters of viewer space, or of the scene that it is a child of, y up. The property takes `[x, y, z]` as well.
+   * Position of its center: x y z in meters of viewer space, or of its parent scene, y up. The property takes `[x, y,
+   * z]` as well.
    * @default `0 0 0`
    * @example position="0 0.5m 0"
    */
@@ -77,7 +79,8 @@ export const CUT_ATTRIBUTES = {
    */
   edge: read<number | 'hard', Numbers>(edgeGrammar),
   /**
-   * What happens there: `hide`; `fade`, to a surface that lets light through; `tint`, shades of `color`; `lighten`; `recolor`, hues turned by `hue`; `displace`, moved by `offset`.
+   * Effect on the splats: `hide`; `fade`, to a translucent surface; `tint`, shades of `color`; `lighten`; `recolor`,
+   * hues rotated by `hue`; `displace`, moved by `offset`.
    * @default `hide`
    * @example effect="tint"
    */
@@ -95,13 +98,13 @@ export const CUT_ATTRIBUTES = {
    */
   color: read<Vector3>(colorGrammar),
   /**
-   * Angle by which `recolor` turns hues, as `hue-rotate()` of CSS.
+   * Hue rotation of `recolor`, like `hue-rotate()` of CSS.
    * @default `180deg`
    * @example hue="90deg"
    */
   hue: read<number, Numbers>(angleGrammar('180deg')),
   /**
-   * Where `displace` moves splats: x y z in meters.
+   * Displacement of `displace`: x y z in meters.
    * @default `0 0 0`
    * @example offset="0 20cm 0"
    */

@@ -1,4 +1,4 @@
-/** Loaded where an element has a cut, a reveal effect or a shader of its own. */
+/** Loaded if an element has a cut, a reveal effect or a shader. */
 import { multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import {
   SplatModifier,
@@ -22,7 +22,7 @@ import { defineCuts } from './define.js';
 import { NO_REVEAL, parseReveal, revealedBy, REVEAL_FORM, type RevealEffect } from './reveal.js';
 import { SplatCutElement, showers, type PlacedCut } from './splat-cut.js';
 
-/** What effects ask of their element. */
+/** Interface of the element for effects. */
 export interface EffectsHost {
   readonly element: ReactiveControllerHost &
     HTMLElement & { splatShader: SplatShader | null; revealProgress: number | null };
@@ -44,10 +44,10 @@ export interface EffectsHost {
 
 type Player = NonNullable<MotionHost['player']>;
 
-/** Cuts of children, how the scene appears, and the page's own function for splats. */
+/** Cuts of children, the reveal effect, and the page's hook for splats. */
 export class Effects implements Mover {
   readonly #host: EffectsHost;
-  /** By device: what draws with the shader as it is now. */
+  /** Compilation of the current shader by device. */
   #programs = new WeakMap<GPUDevice, SplatProgram>();
   readonly #compiling = new WeakMap<GPUDevice, Promise<void>>();
   readonly #modifiers = new Map<Member, SplatModifier>();
@@ -59,7 +59,7 @@ export class Effects implements Mover {
   #last: number | undefined;
   #reveal: RevealEffect = NO_REVEAL;
   #revealText: string | null = null;
-  /** Of what is revealed. */
+  /** State of the reveal effect. */
   #url = '';
   #startedAt: number | undefined;
   #progress = 0;
@@ -71,7 +71,7 @@ export class Effects implements Mover {
     host.behaviours.add(this);
     host.element.addController({ hostUpdated: () => this.#update() });
     this.#update();
-    // What was there before this code asks for nothing.
+    // Frames before this code was loaded did not apply it.
     host.requestFrame();
   }
 
@@ -80,7 +80,7 @@ export class Effects implements Mover {
     this.#host.requestFrame();
   }
 
-  /** What plays by itself, the page's shader included, for the visitor's switch. */
+  /** Player of automatic playback, including the page's shader, for the visitor's switch. */
   playerWith(other: MotionHost['player']): MotionHost['player'] {
     if (!this.#shader?.animated) return other;
     const players: Player[] = [this.#player, ...(other?.canPlay ? [other] : [])];
@@ -109,12 +109,12 @@ export class Effects implements Mover {
     return this.#advanceReveal(now) || moves;
   }
 
-  /** Makes what frames of a scene need, before they show it. Never rejects. */
+  /** Compiles the pipelines of a scene before its first frame. Never rejects. */
   async prepareFor(scene: LoadedGaussians): Promise<void> {
     if (this.#isWanted) await this.#compile(scene);
   }
 
-  /** Puts all of it into the world, before a frame. */
+  /** Writes all effects to the world, before a frame. */
   prepareFrame(): void {
     const { entries, own } = this.#host.sources;
     this.#restartReveal(own);
@@ -132,7 +132,7 @@ export class Effects implements Mover {
     return this.#reveal.kind !== 'none' && this.#revealed < 1 && !this.#isReducing;
   }
 
-  /** How far the scene has appeared, 0..1. */
+  /** Progress of the reveal, 0..1. */
   get #revealed(): number {
     const { revealProgress } = this.#host.element;
     const own = typeof revealProgress === 'number' && !Number.isNaN(revealProgress) ? revealProgress : this.#progress;
@@ -148,7 +148,7 @@ export class Effects implements Mover {
     return (this.#cuts ??= [...found].filter((each) => each instanceof SplatCutElement));
   }
 
-  /** What holds for all scenes. */
+  /** Changes for all scenes. */
   get #sharedChanges(): SplatChanges {
     const { frame, sources, element } = this.#host;
     const bounds = this.#isRevealing ? sources.bounds : null;
@@ -161,7 +161,7 @@ export class Effects implements Mover {
     return { ...reveal, cuts, time: this.#time, uniforms, worldToViewer: matrixOfFrame(frame) };
   }
 
-  /** The cuts of a parent, in the world. */
+  /** The cuts of a parent, in world coordinates. */
   #cutsOf(parent: Element, toWorld: Matrix4): SplatCut[] {
     return this.#children
       .filter(({ parentElement }) => parentElement === parent)
@@ -218,7 +218,7 @@ export class Effects implements Mover {
     if (program) this.#programs.set(device, program);
   }
 
-  /** The scene is drawn without it. */
+  /** The scene is drawn without the shader. */
   #refuse(shader: SplatShader | null, error: Error): void {
     if (shader === null) return;
     this.#shader = null;
@@ -228,7 +228,7 @@ export class Effects implements Mover {
     this.#host.requestFrame();
   }
 
-  /** The page may have set something else. */
+  /** The page may have set another value. */
   #update(): void {
     const { element, attributes } = this.#host;
     this.#readReveal(attributes.revealEffect);
@@ -243,10 +243,10 @@ export class Effects implements Mover {
     this.#shader = shader;
     if (shader?.animated && !before?.animated) this.#isPlaying = !this.#isReducing;
     this.#host.requestFrame();
-    // Other values alone need no other program.
+    // Changed values alone need no other program.
     if (shader && before && isSameCode(shader, before)) return;
     const scenes = this.#host.sources.entries.flatMap(({ member }) => member?.scene ?? []);
-    // The program at hand draws until the next one is there.
+    // The current program draws until the next one is compiled.
     if (scenes.length === 0) this.#programs = new WeakMap();
     for (const scene of scenes) void this.#compile(scene).then(() => this.#host.requestFrame());
   }
@@ -259,7 +259,7 @@ export class Effects implements Mover {
     this.#reveal = effect ?? NO_REVEAL;
   }
 
-  /** Another scene appears anew. */
+  /** Another scene starts its reveal again. */
   #restartReveal(own: SourceEntry): void {
     const { url } = own.scene;
     if (url === this.#url) return;
@@ -274,7 +274,7 @@ export class Effects implements Mover {
     this.#startedAt ??= now;
     const { isPreview, progress } = this.#host.sources;
     const byTime = (now - this.#startedAt) / Math.max(1, this.#reveal.milliseconds);
-    // No finer than what has come.
+    // No finer than the received data.
     this.#progress = this.#reveal.kind === 'detail' && isPreview ? Math.min(byTime, progress ?? 0, 0.95) : byTime;
     return this.#progress < 1;
   }
@@ -283,14 +283,14 @@ export class Effects implements Mover {
 const NO_WEBGL =
   '<gaussian-splat>: WebGL 2 draws the scene without <splat-cut>, reveal-effect and splatShader, which need WebGPU.';
 
-/** Whether two shaders are one program. */
+/** Whether two shaders have the same program. */
 const isSameCode = (a: SplatShader, b: SplatShader): boolean => {
   const of = ({ code, moves, uniforms = {} }: SplatShader): string =>
     JSON.stringify([code, moves, Object.entries(uniforms).map(([name, value]) => [name, Object(value).length])]);
   return of(a) === of(b);
 };
 
-/** A cut in the frame of its parent, in the world. */
+/** Converts a cut from the coordinates of its parent to the world. */
 function inWorld({ placed, offset, edge, ...cut }: PlacedCut, toWorld: Matrix4): SplatCut {
   const size = Math.cbrt(Math.abs(determinant(toWorld)));
   return {

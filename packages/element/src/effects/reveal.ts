@@ -1,14 +1,14 @@
-/** How a scene appears: the attribute `reveal-effect`, as changes of its splats. */
+/** Reveal effects: the attribute `reveal-effect`, as changes of splats. */
 import { cross, normalize, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { SplatChanges } from '@gaussian-splat/renderer/modifiers';
 import type { SceneBounds } from '../camera/settings.js';
 
 const KINDS = ['none', 'fade', 'grow', 'sweep', 'detail'] as const;
 
-/** What the attribute says. */
+/** Value of the attribute. */
 export interface RevealEffect {
   readonly kind: (typeof KINDS)[number];
-  /** Of `sweep`, in viewer space. */
+  /** Axis of `sweep`, in viewer space. */
   readonly axis: Vector3;
   readonly milliseconds: number;
 }
@@ -21,7 +21,7 @@ const DEFAULT_MS = 1500;
 export const NO_REVEAL: RevealEffect = { kind: 'none', axis: AXES.y, milliseconds: DEFAULT_MS };
 export const REVEAL_FORM = 'none, fade, grow, detail, or sweep with an axis such as -y, and a time such as 2s';
 
-/** The attribute `reveal-effect`: null where it is malformed. */
+/** Parses the attribute `reveal-effect`: null if it is malformed. */
 export function parseReveal(text: string | null): RevealEffect | null {
   let effect = NO_REVEAL;
   for (const term of (text ?? 'none').trim().toLowerCase().split(/\s+/)) {
@@ -35,18 +35,18 @@ export function parseReveal(text: string | null): RevealEffect | null {
   return effect;
 }
 
-/** A shape without volume: everything lies outside of it. */
+/** A shape without volume: everything is outside of it. */
 const NOTHING: Matrix4 = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1];
-/** Least share of the splats that `detail` begins with, as a power of 2. */
+/** Initial fraction of the splats in `detail`, as a power of 2. */
 const COARSEST = -6;
-/** Of the radius: standard deviation of the front of `sweep`. */
+/** Standard deviation of the front of `sweep`, as a fraction of the radius. */
 const FRONT = 0.05;
 
 /**
- * What a part of the way is drawn with.
+ * Returns the changes at a progress.
  * @param progress 0..1
- * @param bounds of the scene, world
- * @param axis of `sweep`, world
+ * @param bounds Bounds of the scene in world coordinates.
+ * @param axis Axis of `sweep` in world coordinates.
  */
 export function revealedBy(
   { kind }: RevealEffect,

@@ -9,16 +9,17 @@ import { CUT_ATTRIBUTES, type CutEffect } from './attributes.js';
 
 type Name = keyof typeof CUT_ATTRIBUTES;
 
-/** A cut in the frame of its parent, y up. */
+/** A cut in the coordinates of its parent, y up. */
 export interface PlacedCut extends Omit<SplatCut, 'shapeToWorld'> {
   readonly placed: Matrix4;
 }
 
-/** Who shows the cuts of an element. */
+/** Listeners of elements for their cuts. */
 export const showers = new WeakMap<Element, { cutsChanged(): void }>();
 
 /**
- * A part of space in which splats are hidden, tinted, faded or moved: a child of `<gaussian-splat>`, for all of its scenes, or of one `<splat-scene>`.
+ * Hides, tints, fades or moves the splats in a region of space: a child of `<gaussian-splat>`, for all of its scenes,
+ * or of one `<splat-scene>`.
  *
  * ```html
  * <gaussian-splat src="room.sog">
@@ -37,7 +38,10 @@ export class SplatCutElement extends ReactiveElement {
     hidden: { type: Boolean, reflect: true },
   };
 
-  /** All of its place at once, above `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row after row, or a `DOMMatrix`. null for none. */
+  /**
+   * Its whole transform, which overrides `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row-major,
+   * or a `DOMMatrix`. null for none.
+   */
   declare matrix: ArrayLike<number> | DOMMatrixReadOnly | null;
   readonly #warned = new Set<string>();
   #cut: PlacedCut | undefined;
@@ -48,7 +52,7 @@ export class SplatCutElement extends ReactiveElement {
     this.hidden = false;
   }
 
-  /** What it does; undefined while it is hidden. @internal */
+  /** The cut; undefined while it is hidden. @internal */
   get cut(): PlacedCut | undefined {
     return this.hidden ? undefined : (this.#cut ??= this.#read());
   }
@@ -65,7 +69,7 @@ export class SplatCutElement extends ReactiveElement {
     this.#shower = null;
   }
 
-  /** It shows nothing of its own. */
+  /** It renders nothing itself. */
   protected override createRenderRoot(): HTMLElement {
     return this;
   }
@@ -110,7 +114,7 @@ export class SplatCutElement extends ReactiveElement {
     }
   }
 
-  /** An attribute or its property by the grammar. @param unit of numbers of the property */
+  /** Parses an attribute or its property. @param unit Unit of the property's numbers. */
   #value<T>(name: Name, unit = ''): T {
     const value: unknown = this[name];
     const written =

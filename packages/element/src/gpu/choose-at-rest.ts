@@ -1,15 +1,15 @@
 import { autotune } from '@gaussian-splat/renderer';
 import { sinceLastPicture } from './frame-scheduler.js';
 
-/** Milliseconds without a picture after which a page counts as at rest. */
+/** Milliseconds without a frame after which a page counts as idle. */
 const REST_MS = 1500;
 
 /**
- * Finds what suits a device best, for pages to come: a piece whenever nothing has moved for a while. What is on show keeps what it was begun with. Does nothing
- * where that is known already.
+ * Autotunes a device for later visits, in steps while nothing moves. The current scene keeps its variants. Does nothing
+ * if a result is stored already.
  */
 export function chooseAtRest(device: GPUDevice): void {
-  // Nobody waits for it, and what is on show is right without.
+  // No code waits for the result, and current frames are right without it.
   autotune(device, { pause: untilRest }).catch(() => undefined);
 }
 
@@ -17,6 +17,6 @@ async function untilRest(): Promise<void> {
   let left: number;
   while ((left = document.hidden ? REST_MS : REST_MS - sinceLastPicture()) > 0)
     await new Promise((resolve) => setTimeout(resolve, left));
-  // Safari has no such thing.
+  // Safari does not support it.
   if ('requestIdleCallback' in globalThis) await new Promise((resolve) => requestIdleCallback(resolve));
 }

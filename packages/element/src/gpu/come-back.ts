@@ -1,16 +1,16 @@
-/** Loaded only where no other device comes in place of one that was lost. */
+/** Loaded only if a lost device cannot be replaced at once. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { timerMs } from '../attributes.js';
 import { delay, isDeviceFailure } from './device-failures.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 
-/** @param loss what the browser said of the device that was lost, where it has. */
+/** @param loss Loss information of the browser, if there is any. */
 export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): GaussianSplatError {
   const said = loss && ` (reason "${loss.reason}": ${loss.message.replace(/\.$/, '') || 'nothing more is known'})`;
   const lost = `a device that was lost${said ?? ''}`;
   const why = cause instanceof GaussianSplatError ? `${cause.where}: ${cause.found}` : String(cause);
   const isLoss = isDeviceFailure(cause, true);
-  // Chromium refuses a page that has lost two devices within a short time any other, until it is loaded again.
+  // Chromium denies a page that has lost two devices within a short time any other, until it is reloaded.
   const reload = isLoss ? 'reload the page' : 'reload the page, to which the browser may refuse the GPU until then';
   return new GaussianSplatError('device-lost/unrecoverable', {
     where: 'GPU device',
@@ -24,15 +24,16 @@ export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): Gaussia
   });
 }
 
-/** Pause before the first question, ms; it doubles each time. */
+/** Pause before the first request, ms; it doubles each time. */
 const FIRST_MS = 5_000;
 const LONGEST_MS = 300_000;
-/** A page that comes into sight asks at once, but no sooner than this after the last question, ms. */
+/** A page that becomes visible requests at once, but not sooner than this after the last request, ms. */
 const LEAST_MS = 2_000;
 
 /**
- * Asks for a device ever more rarely, and whenever the page comes into sight: browsers that refuse a page the GPU after crashes do so for some minutes.
- * @returns a share in it; undefined once the wait is aborted
+ * Requests a device at increasing intervals, and whenever the page becomes visible: browsers that deny a page the GPU
+ * after crashes do so for some minutes.
+ * @returns A lease of it; undefined once the wait is aborted.
  */
 export async function deviceBack(device: SharedDevice, signal: AbortSignal): Promise<DeviceLease | undefined> {
   for (let pause = FIRST_MS; ; pause = Math.min(LONGEST_MS, 2 * pause)) {
@@ -45,7 +46,7 @@ export async function deviceBack(device: SharedDevice, signal: AbortSignal): Pro
   }
 }
 
-/** Fulfils after a while, when the page comes into sight, or when the wait is aborted. */
+/** Resolves after a while, when the page becomes visible, or when the wait is aborted. */
 function untilShown(milliseconds: number, signal: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const end = (): void => {

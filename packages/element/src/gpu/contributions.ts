@@ -1,10 +1,10 @@
-/** Loaded only when a page asks what its splats contribute. */
+/** Loaded only if a page requests the contribution of its splats. */
 import type { Camera, SplatFilter } from '@gaussian-splat/core';
 import { Viewpoint, type FrameSettings, type World } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs, readBackWith, untilItHasRoom } from '@gaussian-splat/renderer/tools';
 import type { ReadCounts } from './painter.js';
 
-/** What is counted of: a viewport. */
+/** Source of the counts: a backend. */
 export interface Counted {
   readonly device: GPUDevice;
   readonly isDestroyed: boolean;
@@ -12,12 +12,12 @@ export interface Counted {
   readonly view: { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined };
 }
 
-/** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits: half a step. */
+/** Minimum weight, alpha times transmittance, that is visible on an 8-bit display: half a step. */
 const LEAST_WEIGHT = 0.5 / 255;
-/** Splats of a chunk: noted are whole ones. */
+/** Splats of a chunk, because whole chunks are recorded. */
 const CHUNK = 256;
 
-/** Counts of the last frame of a viewport, and of a view. Reads back from the GPU: for panels, not for frames. */
+/** Reads the counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
 export async function readCounts(viewport: Counted, camera: Camera): Promise<ReadCounts> {
   const { visible, overflow } = await viewport.viewpoint.statistics();
   if (viewport.isDestroyed) throw new Error('the frame is gone');
@@ -25,8 +25,8 @@ export async function readCounts(viewport: Counted, camera: Camera): Promise<Rea
 }
 
 /**
- * Counts the splats that some pixel of a view shows. Draws the view with the compute rasterizer, whatever the page uses, and reads all weights back: for
- * panels, not for frames.
+ * Counts the splats that are visible in some pixel of a view. Draws the view with the compute rasterizer, independent
+ * of the page's, and reads all weights back: for panels, not for frames.
  */
 async function countContributing({ device, view }: Counted, camera: Camera): Promise<number> {
   const { world, settings, filter } = view;

@@ -1,10 +1,10 @@
-/** What a scene's life knows of devices that are lost. */
+/** Handling of lost devices in a scene's life cycle. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { Painter } from './painter.js';
 
-/** The device went away before the scene was seen. */
+/** The device was lost before the first frame. */
 export class DeviceLostError extends Error {
-  /** What the browser says of it. */
+  /** Loss information of the browser. */
   readonly info: GPUDeviceLostInfo;
 
   constructor(info: GPUDeviceLostInfo) {
@@ -13,34 +13,34 @@ export class DeviceLostError extends Error {
   }
 }
 
-/** A device that does not come at all is final at first, but after a loss it may only need a moment. */
+/** A missing device is final at first, but after a loss it may only be delayed. */
 export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
   if (error instanceof DeviceLostError) return true;
   if (!(error instanceof GaussianSplatError)) return false;
-  // A generator may be the first to notice.
+  // A generator may be the first to detect the loss.
   return error.family === 'device-lost' || (!isNew && error.family === 'unsupported');
 }
 
-/** How long it takes at most until a lost device says so, ms: its buffers fail before. */
+/** Maximum delay of the report of a loss, ms: buffers of the device fail before. */
 const LOSS_MS = 200;
 
-/** Whether what failed did so because frames are no longer drawn, or the device was lost. */
+/** Whether a failure resulted from the end of drawing, or from a lost device. */
 export async function isGone(painter: Pick<Painter, 'isDestroyed' | 'isLost'>): Promise<boolean> {
   if (!painter.isDestroyed && !painter.isLost) await delay(LOSS_MS);
   return painter.isDestroyed || painter.isLost;
 }
 
-/** Whether the device was lost before all that was submitted was done. */
+/** Whether the device was lost before all submitted work was done. */
 export async function wasLost(painter: Pick<Painter, 'finished' | 'isLost'>): Promise<boolean> {
   await painter.finished();
-  // The loss is told a little later.
+  // The loss is reported a little later.
   await new Promise((resolve) => setTimeout(resolve));
   return painter.isLost;
 }
 
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Fulfils when the page can be seen, or the wait is aborted: a hidden page would only lose its device again. */
+/** Resolves when the page is visible, or the wait is aborted: a hidden page would only lose its device again. */
 export function pageVisible(signal: AbortSignal): Promise<void> {
   return new Promise((resolve) => {
     const check = (): void => {

@@ -1,33 +1,39 @@
 import { DisplayInterval } from '../dynamic-quality/display-interval.js';
 
-/** Something that draws. */
+/** A client that draws. */
 export interface FrameClient {
-  /** Draws one frame. Asks the scheduler again if there is to be another. `now` is requestAnimationFrame's clock, ms. */
+  /** Draws one frame. Requests the next one from the scheduler if needed. `now` is requestAnimationFrame's clock, ms. */
   drawFrame(now: number): void;
 }
 
-/** Frames until who draws besides counts in full: who draws now and then takes little of what there is. Who draws no more does not count. */
+/**
+ * Frames until another client counts fully: clients that draw occasionally take little of the time. Clients that have
+ * stopped do not count.
+ */
 const MEMORY = 8;
 
-/** When a picture was last drawn in any window, by the page's clock. */
+/** Time of the last frame in any window, by the page's clock. */
 let lastDrawn = -Infinity;
 
-/** Share of the display's interval that frames may take: the page and its compositor need the rest. */
+/** Fraction of the display interval for frames: the page and its compositor need the rest. */
 const SHARE_OF_INTERVAL = 0.8;
 
-/** What a frame may take on the GPU, ms: what the page says, else a share of the display's interval, which elements that draw at the same time share. */
+/**
+ * Target GPU duration of a frame, ms: the page's limit, else a fraction of the display interval, divided among elements
+ * that draw at the same time.
+ */
 export const targetMsOf = (
   budgetMs: number,
   { displayInterval, clients }: Pick<FrameScheduler, 'displayInterval' | 'clients'>,
 ): number => (budgetMs < Infinity ? budgetMs : (SHARE_OF_INTERVAL * displayInterval) / clients);
 
-/** Milliseconds since a picture was last drawn in any window. */
+/** Milliseconds since the last frame in any window. */
 export const sinceLastPicture = (): number => performance.now() - lastDrawn;
 
-/** Of each window that elements are in. */
+/** Scheduler of each window with elements. */
 const KNOWN = new WeakMap<Window, FrameScheduler>();
 
-/** One requestAnimationFrame loop for all elements of a window; it runs only while one of them has asked for a frame. */
+/** One requestAnimationFrame loop for all elements of a window; it runs only while an element has requested a frame. */
 export class FrameScheduler {
   readonly #window: Window;
   #due = new Set<FrameClient>();
@@ -37,35 +43,35 @@ export class FrameScheduler {
   readonly #interval = new DisplayInterval();
   #clients = 1;
 
-  /** @param view the window whose pictures are drawn; default the page's own */
+  /** @param view The window whose frames are drawn; default the page's own. */
   constructor(view: Window = globalThis as unknown as Window) {
     this.#window = view;
   }
 
-  /** The one of a window. */
+  /** Returns the scheduler of a window. */
   static of(view: Window): FrameScheduler {
     const known = KNOWN.get(view) ?? new FrameScheduler(view);
     KNOWN.set(view, known);
     return known;
   }
 
-  /** Milliseconds between two pictures of the display. */
+  /** Milliseconds between two frames of the display. */
   get displayInterval(): number {
     return this.#interval.milliseconds;
   }
 
-  /** Clients that draw at the same time, frame after frame: 1 or more. */
+  /** Number of clients that draw at the same time, frame after frame: at least 1. */
   get clients(): number {
     return this.#clients;
   }
 
-  /** Asks for one frame; asking twice is asking once. */
+  /** Requests one frame; repeated requests count once. */
   request(client: FrameClient): void {
     this.#due.add(client);
     this.#schedule();
   }
 
-  /** Takes back what was asked for. */
+  /** Cancels a request. */
   cancel(client: FrameClient): void {
     this.#due.delete(client);
     this.#drawing.delete(client);
@@ -92,7 +98,7 @@ export class FrameScheduler {
 
   readonly #tick = (time: number): void => {
     this.#handle = 0;
-    // Clocks of windows begin when they are opened.
+    // Each window has its own clock origin.
     const now =
       this.#window === (globalThis as unknown as Window)
         ? time
@@ -112,7 +118,7 @@ export class FrameScheduler {
       try {
         client.drawFrame(now);
       } catch (error) {
-        // One element's fault must not stop the others.
+        // A fault of one element must not stop the others.
         reportError(error);
       }
     }

@@ -6,50 +6,53 @@ import type { Contents, LodSettings, Painter, PainterEvents, Drawable, Place } f
 import type { DeviceLease } from './shared-device.js';
 import { Viewport } from './viewport.js';
 
-/** A scene's Gaussians with levels of detail besides; those alone are freed with it. */
+/** A scene's Gaussians with additional levels of detail, which own only the levels. */
 export interface OwnedLevels extends GaussianScene {
-  /** Bytes of GPU memory that the levels take. */
+  /** Bytes of GPU memory of the levels. */
   readonly byteLength: number;
   destroy(): void;
 }
 
 /** Gaussians with one owner. */
 export interface OwnedGaussians extends GaussianScene {
-  /** Splats of the frame on show, where there is room for more. */
+  /** Splats of the current frame, if the capacity is larger. */
   readonly frameCount?: number;
-  /** Splats of the finest level, where the file has levels of detail. */
+  /** Splats of the finest level, if the file has levels of detail. */
   readonly leafCount?: number;
-  /** Splats of the file that were left out; a generator's are counted by nobody. */
+  /** Dropped splats of the file; unknown for a generator. */
   readonly droppedCount?: number;
   readonly byteLength: number;
   destroy(): void;
 }
 
-/** Triangles that a source has besides its splats, or in place of them. */
+/** Triangles of a source, with or without splats. */
 export interface MeshModel {
   readonly triangles: number;
   readonly byteLength: number;
-  /** Grows when it has moved by itself. */
+  /** Incremented when its animation has moved it. */
   readonly version: number;
   dispose(): void;
 }
 
-/** What one source has on the GPU: its splats, levels of detail of them, what writes them, and the lease that keeps the device. */
+/**
+ * The GPU content of one source: its splats, their levels of detail, their generator, and the lease that keeps the
+ * device.
+ */
 export class LoadedGaussians implements Drawable {
-  /** What draws it. */
+  /** Its backend. */
   readonly renderer: 'webgpu' | 'webgl' = 'webgpu';
   readonly #bounds: SceneBounds;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
-  /** Submissions that the painting of a frame is divided into. */
+  /** Number of submissions of a frame. */
   readonly submissions: number;
   /** Its triangles, once they are read. */
   model: MeshModel | undefined;
-  /** What its splats are ordered by, where its file tells. */
+  /** Sort order of its splats, if its file declares one. */
   readonly order: 'pixel' | undefined;
-  /** Its file has triangles, too. */
+  /** Whether its file has triangles, too. */
   readonly hasMeshes: boolean;
-  /** What of its file is not drawn, for people. */
+  /** Messages about content of its file that is not drawn. */
   warnings: readonly string[];
   /** Called when the next frame would show more than the last one. */
   onChange: () => void = () => undefined;
@@ -90,7 +93,7 @@ export class LoadedGaussians implements Drawable {
     if (live) QueueClock.of(lease.device).isShared = true;
   }
 
-  /** Of a generator, those of its last runs. */
+  /** For a generator, the bounds of its last runs. */
   get bounds(): SceneBounds {
     return this.live?.bounds ?? this.#bounds;
   }
@@ -99,24 +102,24 @@ export class LoadedGaussians implements Drawable {
     return this.#gaussians;
   }
 
-  /** Levels of detail that were built of its splats. */
+  /** Levels of detail that were built from its splats. */
   get levels(): OwnedLevels | undefined {
     return this.#levels;
   }
 
-  /** What is drawn of it: the levels, where there are some, hold the splats, too. */
+  /** The drawn scene: the levels, if there are any, include the splats. */
   get drawn(): GaussianScene {
     return this.#levels ?? this.#gaussians;
   }
 
-  /** Draws from these levels from now on, or from the splats alone; levels before are freed. */
+  /** Draws with these levels in subsequent frames, or only the splats; frees previous levels. */
   setLevels(levels: OwnedLevels | undefined): void {
     if (levels === this.#levels) return;
     this.#levels?.destroy();
     this.#levels = levels;
   }
 
-  /** How much detail is drawn, at rest too. */
+  /** LOD settings, also at rest. */
   get detail(): LodSettings {
     return this.#detail;
   }
@@ -125,19 +128,19 @@ export class LoadedGaussians implements Drawable {
     this.#detail = detail;
   }
 
-  /** True for a scene whose file brings levels of detail, all at once or page by page. */
+  /** Whether its file has levels of detail, complete or streamed. */
   get hasOwnLevels(): boolean {
     return this.gaussians.pages.some(({ details }) => details !== undefined);
   }
 
-  /** Draws other splats from now on; levels that were built of those before are freed, and so are these. */
+  /** Replaces the splats in subsequent frames; frees the previous ones and their levels. */
   replaceGaussians(gaussians: OwnedGaussians): void {
     this.setLevels(undefined);
     this.#gaussians.destroy();
     this.#gaussians = gaussians;
   }
 
-  /** What draws frames where it is. */
+  /** Creates its backend. */
   openPainter(contents: Contents, events: PainterEvents): Painter {
     return new Viewport(this, contents, events);
   }
@@ -155,7 +158,7 @@ export class LoadedGaussians implements Drawable {
     return this.#lease.isLost;
   }
 
-  /** Fulfils when the device is lost. */
+  /** Resolves when the device is lost. */
   get lost(): Promise<GPUDeviceLostInfo> {
     return this.#lease.lost;
   }
@@ -169,7 +172,7 @@ export class LoadedGaussians implements Drawable {
     return this.signal.aborted;
   }
 
-  /** Frees the GPU memory and lets go of the device. */
+  /** Frees the GPU memory and releases the device. */
   destroy(): void {
     if (this.isDestroyed) return;
     this.#life.abort();

@@ -1,4 +1,4 @@
-/** What people read where there is no GPU device, or too little memory, and of other errors that few pages have. Loaded then. */
+/** Messages for missing GPU devices, insufficient memory, and other rare errors. Loaded on demand. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { visitorMessages } from '../errors.js';
 
@@ -38,7 +38,7 @@ export const noAdapter = (): GaussianSplatError =>
     remedy: 'switch on hardware acceleration in the browser settings, or update the graphics driver',
   });
 
-/** Prototype.js 1.7 has an `Array.from` of its own. */
+/** Prototype.js 1.7 replaces `Array.from`. */
 export const changedPage = (): GaussianSplatError =>
   new GaussianSplatError('unsupported/page', {
     where: 'this page',
@@ -64,7 +64,7 @@ export const noContext = (): GaussianSplatError =>
     remedy: 'use a browser that shows WebGPU on a canvas',
   });
 
-/** Of a page's own device, or of a browser that does not answer. */
+/** For a page's own device, or a browser that does not respond. */
 export const noDevice = (cause: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/no-adapter', {
     where: 'the graphics adapter',
@@ -74,7 +74,7 @@ export const noDevice = (cause: unknown): GaussianSplatError =>
     cause,
   });
 
-/** @param where what could not be drawn */
+/** @param where Content that could not be drawn. */
 export const outOfMemory = (where: string, cause: GPUError): GaussianSplatError =>
   new GaussianSplatError('out-of-memory/allocation', {
     where,

@@ -18,24 +18,30 @@ export interface OpenOptions {
   readonly device: SharedDevice;
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
-  /** Address of a frame of a sequence as it is fetched. */
+  /** Address for fetching a frame of a sequence. */
   readonly frameUrl: (url: string) => string;
   readonly onProgress: ProgressListener;
-  /** Called with what can be shown of a scene that is still loading; the scene is the callee's. Absent: previews are not wanted. */
+  /** Called with a preview of a scene that is still loading; the callee owns it. Absent: no previews. */
   readonly onPreview?: (preview: LoadedGaussians) => void;
-  /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. Gets its bytes. */
+  /**
+   * Called with the size of the new scene just before its upload: the moment to free an old one, so that both never
+   * coexist.
+   */
   readonly beforeUpload: (byteLength: number) => void;
-  /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
+  /** Upper limit of the scene's GPU memory in bytes; undefined for no limit but the device's. */
   readonly memoryBudget: number | undefined;
-  /** Submissions that the painting of a frame is divided into. */
+  /** Number of submissions of a frame. */
   readonly submissions: number;
-  /** Opens what is no scene of splats. */
+  /** Opens sources other than scenes of splats. */
   readonly open: typeof openGaussians | undefined;
-  /** What a generator needs to know beyond the request. */
+  /** Additional data of a request for a generator. */
   readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
-/** Opens what is asked for, with WebGL where there is no WebGPU and the request lets it. Rejects with GaussianSplatError or the signal's reason. */
+/**
+ * Opens the requested source, with WebGL if WebGPU is unavailable and the request allows it. Rejects with
+ * GaussianSplatError or the signal's reason.
+ */
 export async function openScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   const { open = openGaussians } = options;
   if (!Array.from({ length: 1 }, () => 1)[0]) throw await why(({ changedPage }) => changedPage());
@@ -51,15 +57,18 @@ export async function openScene(request: SceneRequest, options: OpenOptions): Pr
   return openGlScene(limited(request, options), options, reason);
 }
 
-/** The request with the bytes that a load may take by default. */
+/** The request with default byte limits of a load. */
 export const limited = <T extends FileRequest>(request: T, { memoryBudget }: Pick<OpenOptions, 'memoryBudget'>): T => ({
   ...request,
   limits: { maxBytes: loadBytes(memoryBudget), ...request.limits },
 });
 
-/** Opens what is asked for with WebGPU; what its device is served best with is looked for later. Rejects with GaussianSplatError or the signal's reason. */
+/**
+ * Opens the requested source with WebGPU; autotuning of the device follows later. Rejects with GaussianSplatError or
+ * the signal's reason.
+ */
 export async function openGaussians(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  // Known at once, and then not a byte is fetched.
+  // Checked first, so that no bytes are fetched in vain.
   await assertWebGpu();
   const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
   const scene = await open(limited(request, options), options);
@@ -67,14 +76,14 @@ export async function openGaussians(request: SceneRequest, options: OpenOptions)
   return scene;
 }
 
-/** Device and file at the same time, then the upload. */
+/** Requests device and file concurrently, then uploads. */
 async function openLoadedScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
+  // If either fails the other is canceled, because bytes are useless without a GPU.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
   options.signal.addEventListener('abort', giveUp, { once: true });
   const acquiring = options.device.acquire();
-  // While the bytes are on their way there is time to find out what a first picture can be drawn with.
+  // While the bytes are in transit, variants for the first frame are selected.
   const choosing = acquiring.then(({ device }) => startVariants(device, pictures()));
   const previews =
     options.onPreview && new PreviewUploads({ ...options, onPreview: options.onPreview, ready: choosing });
@@ -114,13 +123,13 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
   }
 }
 
-/** Generators are known by the name of the file, or by the contract that the page gives along. */
+/** Generators are recognized by the file name, or by a contract from the page. */
 export function isGenerator({ url, contract }: SceneRequest): boolean {
   if (contract !== undefined && contract !== null && contract !== '') return true;
   return /\.onnx$/i.test(nameIn(url));
 }
 
-/** What tells a kind: the path of an address, or the name that a page gives a file behind it. */
+/** The name that identifies a kind: the path of an address, or the name that a page appends to an object URL. */
 function nameIn(url: string): string {
   if (!URL.canParse(url)) return url;
   const { pathname, protocol, hash } = new URL(url);
@@ -145,7 +154,7 @@ async function openSequence(
   return scene;
 }
 
-/** Device and code at the same time. */
+/** Requests device and code concurrently. */
 async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   const acquiring = options.device.acquire();
   try {
@@ -158,7 +167,8 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /**
- * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, a clip by its extension, and so is streamed SOG, which may be wanted whole.
+ * LOD folders are recognized by the name of their manifest, clips by their extension, and streamed SOG by its name,
+ * unless it is to be loaded completely.
  */
 export function isStreamed({ url, isWhole }: SceneRequest): boolean {
   const name = /(^|\/)(detail|lod-meta)\.json$|\.gsv$/i.exec(nameIn(url));
@@ -178,7 +188,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     const { openStreamed } = await opening;
     signal.throwIfAborted();
     const onChange = (): void => scene?.onChange();
-    // How much of it fits is decided when its manifest is there.
+    // The fitting part is determined when the manifest is loaded.
     beforeUpload(memoryBudget ?? 0);
     const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
       ...{ loader, signal, onProgress, memoryBudget, onChange, live: options.live },
@@ -191,14 +201,14 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
   }
 }
 
-/** What the canvas is made of. */
+/** Format of the canvas. */
 export const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
 
-/** That no variant draws the right image ends the loading; that none could be timed does not. */
+/** Only a failed self-test aborts loading; failed timings do not. */
 export function unlessWrong(error: unknown): void {
   if (error instanceof GaussianSplatError && error.code === 'unsupported/wrong-image') throw error;
 }
 
 function ignore(): void {
-  // The failure that matters has been thrown already.
+  // The relevant failure has already been thrown.
 }

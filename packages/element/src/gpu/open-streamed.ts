@@ -1,4 +1,4 @@
-/** Scenes that are streamed: page by page (docs/lod-format.md), or streamed SOG box by box. */
+/** Opens streamed scenes: page by page (docs/lod-format.md), or streamed SOG box by box. */
 import { partRequest } from '@gaussian-splat/core/fetch';
 import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
@@ -16,15 +16,15 @@ export interface StreamedOptions {
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
   readonly onProgress: ProgressListener;
-  /** Bytes of GPU memory that pages may take; undefined for what suits the device. */
+  /** Bytes of GPU memory for pages; undefined for the default of the device. */
   readonly memoryBudget: number | undefined;
-  /** Called when another frame is asked for. */
+  /** Called when another frame is needed. */
   readonly onChange: () => void;
-  /** What a clip needs to know. */
+  /** Additional data for a clip. */
   readonly live: () => Pick<LiveRequest, 'listeners' | 'loops' | 'state'>;
 }
 
-/** What comes in parts. */
+/** A scene that is loaded in parts. */
 export interface OpenedStream {
   readonly gaussians: OwnedGaussians;
   readonly bounds: SceneBounds;
@@ -34,16 +34,16 @@ export interface OpenedStream {
   readonly warnings?: readonly string[];
 }
 
-/** Of the memory that all scenes of the page have left: another one may come. */
+/** Fraction of the memory that the scenes of the page leave unused, because others may follow. */
 const SHARE_OF_REST = 0.5;
-/** Parts of a scene that failed are listed up to so many. */
+/** Maximum number of listed failures of parts. */
 const MOST_WARNINGS = 16;
-/** Pixels that what is drawn may be displaced where the caps leave room for more. */
+/** Allowed error in pixels, if the limits allow it. */
 const DETAIL = 1;
 
 /**
- * Opens a folder by its manifest: fetches that and what is coarsest. Failures of parts are added to `warnings` later on.
- * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason
+ * Opens a folder by its manifest: fetches that and the coarsest level. Failures of parts are added to `warnings` later.
+ * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason.
  */
 export async function openStreamed(
   request: SceneRequest,
@@ -55,14 +55,14 @@ export async function openStreamed(
   const caps = streamCaps();
   const warnings: string[] = [];
   const pool: PoolOptions = {
-    // As coarse as it must be beside many others, but never without a place: asked for when that is taken.
+    // Computed when the pool is allocated, so that the scene gets coarser beside many others, but always has a slot.
     get memoryBudget() {
       const { budgetBytes, bytes } = MemoryLedger.of(device);
       return Math.min(memoryBudget, caps.bytes, SHARE_OF_REST * Math.max(0, budgetBytes - bytes));
     },
     signal,
     onChange,
-    // A page that is missing leaves what stands for it on show. It is requested again and again, but reported once.
+    // The parent of a missing page stays visible. The page is requested again repeatedly, but reported once.
     onError: (error) => {
       const sentence = error instanceof Error ? error.message : String(error);
       if (warnings.includes(sentence) || warnings.length === MOST_WARNINGS) return;
@@ -88,7 +88,7 @@ async function openClip(request: SceneRequest, device: GPUDevice, options: Strea
   return { gaussians, bounds, live: player };
 }
 
-/** What one scene may fetch: the limits count for all of its parts together, each once however often it comes and goes. */
+/** Limits of the downloads of one scene: they apply to all of its parts together, each counted once. */
 class Allowance {
   readonly #limits: SceneLimits;
   readonly #bytes = new Map<string, number>();
@@ -98,7 +98,7 @@ class Allowance {
     this.#limits = limits;
   }
 
-  /** The limits that are left for a part. */
+  /** The remaining limits for a part. */
   of(part: string): SceneLimits {
     const { maxBytes = Infinity } = this.#limits;
     const others = this.#sum - (this.#bytes.get(part) ?? 0);

@@ -12,76 +12,76 @@ import type {
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 
-/** How frames are drawn. */
+/** Settings of frames. */
 export interface Rendering {
   readonly quality: Quality;
-  /** Spherical harmonics above this degree are not evaluated. */
+  /** Maximum degree of spherical harmonics to evaluate. */
   readonly shDegree: ShDegree;
   readonly order: RenderSettings['order'];
-  /** In place of those of the scenes. */
+  /** Overrides those of the scenes. */
   readonly filter?: SplatFilter | undefined;
 }
 
-/** How much detail is drawn of a scene that has levels of it. */
+/** LOD settings for scenes with levels of detail. */
 export type LodSettings = Pick<FrameSettings, 'detail' | 'splatBudget'>;
 
-/** Counts that have to be read back from the GPU. */
+/** Counts that are read back from the GPU. */
 export interface ReadCounts {
   readonly drawn: number;
-  /** Visible, but without room in what the device allows a buffer to hold. */
+  /** Visible splats beyond the capacity of the device's buffers. */
   readonly left: number;
-  /** null where it is not counted: with WebGL. */
+  /** null with WebGL, which does not count it. */
   readonly contributed: number | null;
 }
 
-/** Where frames are drawn: what keeps the device, and knows what draws on it. */
+/** Owner of a device, on which frames are drawn. */
 export interface Place {
-  /** What draws: places with the same one share a painter. */
+  /** The GPU context: owners with the same one share a backend. */
   readonly context: GPUDevice | WebGL2RenderingContext;
   readonly limits: { readonly maxTextureDimension2D: number };
-  /** What scenes hold of its memory. */
+  /** GPU memory of the scenes. */
   readonly memory: MemoryLedger;
   readonly isLost: boolean;
   readonly lost: Promise<GPUDeviceLostInfo>;
 }
 
-/** A scene that is drawn: where, and by what. */
+/** A scene that can be drawn, with its device and backend. */
 export interface Drawable {
   readonly place: Place;
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
-  /** Submissions that the painting of a frame is divided into. */
+  /** Number of submissions of a frame. */
   readonly submissions: number;
-  /** What draws frames on it. */
+  /** Creates a backend for its device. */
   openPainter(contents: Contents, events: PainterEvents): Painter;
 }
 
-/** What frames show, as of now. */
+/** Current content of frames. */
 export interface Contents {
   readonly world: World;
-  /** How much detail is drawn, at rest too. */
+  /** LOD settings, also at rest. */
   readonly levels: LodSettings;
   /**
-   * Called before each frame: puts into the world what is to be drawn.
-   * @returns what changes whenever the frame would
+   * Called before each frame: updates the world.
+   * @returns A key that changes whenever the frame would.
    */
   prepareFrame(): string;
-  /** Draws what is no splats, before these are drawn over it. @returns where the splats are drawn, as far as that differs */
+  /** Draws meshes, before splats are drawn over them. @returns Overrides of the target for the splats. */
   drawBeneath?(frame: Frame): Partial<FrameTarget>;
 }
 
-/** What a painter tells. */
+/** Events of a backend. */
 export interface PainterEvents {
-  /** The frame just drawn lacked something that the next one will have. */
+  /** The last frame was incomplete; the next one will not be. */
   readonly onIncomplete: () => void;
-  /** A later frame than the first needs more memory than there is: `out-of-memory/allocation`. */
+  /** A later frame than the first needs more memory than available: `out-of-memory/allocation`. */
   readonly onError: (error: GaussianSplatError) => void;
 }
 
-/** What a canvas shows: a context that painters of one kind draw into. */
+/** Surface of a canvas: a context for backends of one kind. */
 export interface Surface {
   readonly canvas: HTMLCanvasElement | OffscreenCanvas;
-  /** Clears the canvas, and frees what it holds. */
+  /** Clears the canvas, and frees its resources. */
   unconfigure(): void;
 }
 
@@ -91,39 +91,39 @@ export interface CanvasFrame {
   readonly surface: Surface;
   /** Premultiplied. */
   readonly background?: Rgba | undefined;
-  /** What is other than at rest. */
+  /** Settings that differ from those at rest. */
   readonly settings?: Partial<PerFrameSettings> | undefined;
-  /** The picture is read in the same task. */
+  /** Whether the frame is read in the same task. */
   readonly isRead?: boolean;
 }
 
-/** Draws frames on canvases: a `Viewport` with WebGPU, a `GlPainter` with WebGL. */
+/** Draws frames on canvases: `WebGpuBackend` or `WebGlBackend`. */
 export interface Painter {
   readonly place: Place;
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
-  /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
+  /** Bytes of GPU memory for drawing, without the splats. */
   readonly byteLength: number;
-  /** Share of the pixels of each side that frames are drawn with because splats cover them too often, 0..1. */
+  /** Resolution scale of each side that the overdraw limit requires, 0..1. */
   readonly pixelShare: number;
   readonly isDestroyed: boolean;
   readonly isLost: boolean;
-  /** True if there is what frames with other settings need. */
+  /** Whether the pipelines for other settings are compiled. */
   readonly isPrepared: boolean;
-  /** What stands between the renderer and the canvas; undefined for frames as they are drawn. */
+  /** Filter between the renderer and the canvas; undefined for unprocessed frames. */
   readonly filter: FrameFilter | undefined;
-  /** It closes its filter when it gets another one, and when it is destroyed. */
+  /** Closes the previous filter; destroying the backend closes the current one. */
   setFilter(filter: FrameFilter | undefined): void;
-  /** Draws the frames to come like this. */
+  /** Sets the settings of subsequent frames. */
   setRendering(rendering: Rendering): void;
-  /** Makes what frames with other settings need, so that none of them has to. */
+  /** Compiles the pipelines for other settings, so that no frame has to. */
   prepare(settings: readonly Partial<PerFrameSettings>[]): void;
-  /** The canvas's context, set up to be drawn into; null for a canvas of another kind. */
+  /** Configures the canvas's context for drawing; null for a canvas of another kind. */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null;
   /**
    * Encodes and submits one frame.
-   * @param content what `Contents.prepareFrame` has just returned
-   * @param onTime gets how long the frame kept the GPU, some frames later
+   * @param content The last result of `FrameSource.prepareFrame`.
+   * @param onTime Is called with the GPU time of the frame, some frames later.
    */
   render(frame: CanvasFrame, content: string, onTime?: (time: WorkTime) => void): void;
   /**
@@ -131,12 +131,12 @@ export interface Painter {
    * @throws GaussianSplatError `out-of-memory/allocation`
    */
   renderFirst(frame: CanvasFrame, content: string): Promise<void>;
-  /** Looks into the last frame: see `Viewpoint.probe`. */
+  /** Probes the last frame: see `Viewpoint.probe`. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
-  /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
+  /** Reads the counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
   readCounts(camera: Camera): Promise<ReadCounts>;
-  /** Fulfils when the GPU has done all that was asked of it, or is lost. */
+  /** Resolves when the GPU has finished all submitted work, or is lost. */
   finished(): Promise<unknown>;
-  /** Frees the GPU memory. What it draws is its owner's. */
+  /** Frees the GPU memory, except that of the scenes, which their owners free. */
   destroy(): void;
 }

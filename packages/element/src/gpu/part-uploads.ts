@@ -19,17 +19,17 @@ export class PartUploads {
   readonly #device: Promise<GPUDevice>;
   readonly #options: PartUploadOptions;
   #gaussians: Promise<GaussianBuffers> | undefined;
-  /** Fulfils once all portions so far are written. */
+  /** Fulfills once all portions so far are written. */
   #written: Promise<void> = Promise.resolve();
   #left = BYTES_AT_ONCE;
 
-  /** @param device fulfils once scenes may be allocated on it */
+  /** @param device fulfills once scenes may be allocated on it */
   constructor(device: Promise<GPUDevice>, options: PartUploadOptions) {
     this.#device = device;
     this.#options = options;
   }
 
-  /** For the loader. A head begins the upload, and discards what came before it. */
+  /** Receives parts of the loader. A head starts the upload and discards the previous one. */
   add(part: ScenePart): void {
     if ('head' in part) {
       this.destroy();
@@ -78,5 +78,5 @@ export class PartUploads {
 }
 
 function ignore(): void {
-  // What matters of it is awaited elsewhere.
+  // Its result is awaited elsewhere.
 }

@@ -5,12 +5,12 @@ import { upload, type SceneUploadOptions } from './upload.js';
 
 export interface PreviewUploadOptions extends SceneUploadOptions {
   readonly device: SharedDevice;
-  /** Fulfils when the device is ready to draw. */
+  /** Resolves when the device is ready to draw. */
   readonly ready: Promise<unknown>;
   readonly onPreview: (preview: LoadedGaussians) => void;
 }
 
-/** Puts the previews of one load on the GPU, one at a time; of those that come meanwhile the latest is next. */
+/** Uploads the previews of one load, one at a time; of those that arrive meanwhile the latest is next. */
 export class PreviewUploads {
   readonly #options: PreviewUploadOptions;
   readonly #over = new AbortController();
@@ -21,13 +21,13 @@ export class PreviewUploads {
     this.#options = options;
   }
 
-  /** For the loader. */
+  /** Callback for the loader. */
   readonly show = (preview: LoadedScene): void => {
     this.#next = preview;
     if (!this.#isBusy) void this.#run();
   };
 
-  /** The whole scene has come, or nothing will: what is under way is dropped. */
+  /** Call when the whole scene has arrived, or the load has failed: discards pending previews. */
   end(): void {
     this.#next = undefined;
     this.#over.abort();
@@ -42,7 +42,7 @@ export class PreviewUploads {
         await this.#upload(preview);
       }
     } catch {
-      // What keeps a preview from the GPU keeps the whole scene from it, too, and that load says so.
+      // A failure here also affects the whole scene, whose load reports it.
     } finally {
       this.#isBusy = false;
     }

@@ -2,21 +2,21 @@ import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import type * as reasons from './no-device.js';
 
-/** An error whose text few pages need. */
+/** An error whose message is loaded on demand. */
 export const why = async (reason: (of: typeof reasons) => GaussianSplatError): Promise<GaussianSplatError> =>
   reason(await loadModule('the text of an error', () => import('./no-device.js')));
 
-/** Rejects with the reason, if there is one, why this page has no WebGPU at all. */
+/** Rejects with the reason if this page has no WebGPU at all. */
 export async function assertWebGpu(): Promise<void> {
   try {
     if (typeof navigator !== 'undefined' && navigator.gpu) return;
   } catch {
-    // An extension for privacy has made it throw.
+    // Privacy extensions may make it throw.
   }
   throw await why(({ noWebGpu }) => noWebGpu());
 }
 
-/** What models on the same device can use where it is there; float16 models need the first. */
+/** Features for models on the same device, used if available; float16 models need the first. */
 const GENERATOR_FEATURES: readonly GPUFeatureName[] = ['shader-f16', 'subgroups' as GPUFeatureName];
 const GENERATOR_LIMITS = [
   'maxStorageBuffersPerShaderStage',
@@ -27,7 +27,7 @@ const GENERATOR_LIMITS = [
   'maxComputeWorkgroupSizeZ',
 ] as const;
 
-/** One device serves scenes and generators: nobody knows beforehand which a page will show. */
+/** One device serves scenes and generators, because the kind of later sources is unknown. */
 function withGeneratorNeeds(adapter: GPUAdapter, descriptor: GPUDeviceDescriptor): GPUDeviceDescriptor {
   const features = GENERATOR_FEATURES.filter((feature) => adapter.features.has(feature));
   const limits = Object.fromEntries(GENERATOR_LIMITS.map((name) => [name, adapter.limits[name]]));
@@ -38,7 +38,7 @@ function withGeneratorNeeds(adapter: GPUAdapter, descriptor: GPUDeviceDescriptor
   };
 }
 
-/** A GPU device with the limits that the renderer can use. Throws GaussianSplatError `unsupported/*`. */
+/** Requests a GPU device with the limits that the renderer can use. Throws GaussianSplatError `unsupported/*`. */
 export async function requestGpuDevice(): Promise<GPUDevice> {
   await assertWebGpu();
   const adapter = await navigator.gpu.requestAdapter({ powerPreference: 'high-performance' });

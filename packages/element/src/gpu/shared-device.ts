@@ -3,13 +3,13 @@ import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { Place } from './painter.js';
 import { requestGpuDevice, why } from './request-device.js';
 
-/** How long a device is waited for, ms. */
+/** Time limit of a request for a device, ms. */
 const ANSWER_MS = 20_000;
 
-/** A share in the page's GPU device. */
+/** A lease of the page's GPU device. */
 export interface DeviceLease extends Place {
   readonly device: GPUDevice;
-  /** Gives the share back; the last one destroys the device. Further calls do nothing. */
+  /** Releases the lease; the last one destroys the device. Further calls have no effect. */
   release(): void;
 }
 
@@ -18,7 +18,7 @@ class DeviceSession {
   isLost = false;
   isClosed = false;
   readonly device: GPUDevice;
-  /** Whom a loss is told. Not by one promise for all: it would hold on to everybody who ever waited for it. */
+  /** Loss listeners. One shared promise would keep every past waiter alive. */
   readonly #listeners = new Set<(info: GPUDeviceLostInfo) => void>();
   readonly #isKept: boolean;
   #info: GPUDeviceLostInfo | undefined;
@@ -36,7 +36,7 @@ class DeviceSession {
     });
   }
 
-  /** A share in the device; the last one to be given back calls `onUnused`. */
+  /** Creates a lease of the device; releasing the last one calls `onUnused`. */
   lease(onUnused: () => void): DeviceLease {
     let tell: (info: GPUDeviceLostInfo) => void = () => undefined;
     const lost = new Promise<GPUDeviceLostInfo>((resolve) => (tell = resolve));
@@ -71,7 +71,7 @@ class DeviceSession {
 
 /**
  * One GPU device for all elements of a page: requested when the first of them needs it, destroyed when the last has
- * let go, requested anew after a loss.
+ * released it, requested again after a loss.
  */
 export class SharedDevice {
   readonly #request: () => GPUDevice | Promise<GPUDevice>;
@@ -79,8 +79,9 @@ export class SharedDevice {
   #session: Promise<DeviceSession> | null = null;
 
   /**
-   * @param request where devices come from; asked again after a loss.
-   * @param options.keepDevice leaves the device alone when the last user has let go: for a page that has its own.
+   * @param request Source of devices; called again after a loss.
+   * @param options.keepDevice Does not destroy the device when the last user has released it: for a page that has its
+   * own.
    */
   constructor(
     request: () => GPUDevice | Promise<GPUDevice> = requestGpuDevice,
@@ -90,7 +91,7 @@ export class SharedDevice {
     this.#keepDevice = options.keepDevice ?? false;
   }
 
-  /** A share in the device. Rejects with GaussianSplatError `unsupported/*` where there is none to be had. */
+  /** Returns a lease of the device. Rejects with GaussianSplatError `unsupported/*` if none is available. */
   async acquire(): Promise<DeviceLease> {
     const opening = (this.#session ??= this.#open());
     let session: DeviceSession;
@@ -100,7 +101,7 @@ export class SharedDevice {
       if (error instanceof GaussianSplatError) throw error;
       throw await why(({ noDevice }) => noDevice(error));
     }
-    // Its last user may have closed it while we waited.
+    // Its last user may have closed it meanwhile.
     if (session.isClosed) return this.acquire();
     return session.lease(() => {
       this.#forget(opening);
@@ -119,7 +120,7 @@ export class SharedDevice {
     return new DeviceSession(await this.#answer(), this.#keepDevice);
   }
 
-  /** A browser whose GPU process hangs never answers. */
+  /** A browser with a hanging GPU process never responds. */
   async #answer(): Promise<GPUDevice> {
     let isLate = false;
     let timer: ReturnType<typeof setTimeout> | undefined;

@@ -1,6 +1,6 @@
 import { isHandheld } from './memory-budget.js';
 
-/** What a device is trusted with for a streamed scene: phones end pages that take more. */
+/** Limits of a streamed scene by device, because phones terminate pages that use more. */
 export interface StreamCaps {
   readonly splats: number;
   readonly bytes: number;

@@ -5,13 +5,16 @@ import type { DeviceLease } from './shared-device.js';
 
 export interface SceneUploadOptions {
   readonly signal: AbortSignal;
-  /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
+  /** Upper limit of the scene's GPU memory in bytes; undefined for no limit but the device's. */
   readonly memoryBudget: number | undefined;
-  /** Submissions that the painting of a frame is divided into. */
+  /** Number of submissions of a frame. */
   readonly submissions: number;
 }
 
-/** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
+/**
+ * Uploads a scene to the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the
+ * signal's reason.
+ */
 export async function upload(
   lease: DeviceLease,
   scene: LoadedScene,

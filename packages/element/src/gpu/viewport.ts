@@ -16,7 +16,10 @@ import type {
 import type { Counted } from './contributions.js';
 import { why } from './request-device.js';
 
-/** Draws frames on one WebGPU device: a viewpoint, whose buffers fit the frame's size, and what stands between it and the canvas. */
+/**
+ * Draws frames on one WebGPU device: a viewpoint, whose buffers match the frame size, and the optional filter before
+ * the canvas.
+ */
 export class Viewport implements Painter {
   readonly viewpoint: Viewpoint;
   readonly device: GPUDevice;
@@ -29,7 +32,7 @@ export class Viewport implements Painter {
   #filter: FrameFilter | undefined;
   #isDestroyed = false;
   #isPrepared = false;
-  /** Size of the last frame; empty if the next one may need other buffers, whatever its size. */
+  /** Size of the last frame; empty if the next one may need other buffers for any size. */
   #drawnSize = '';
   #layout = 0;
 
@@ -69,7 +72,7 @@ export class Viewport implements Painter {
 
   setRendering(rendering: Rendering): void {
     const { quality, shDegree, order } = this.#rendering;
-    // A filter takes effect with the next frame, whatever draws it.
+    // A low-pass filter takes effect with the next frame of any kind.
     this.#rendering = rendering;
     if (rendering.quality === quality && rendering.shDegree === shDegree && rendering.order === order) return;
     this.#isPrepared = false;
@@ -88,11 +91,11 @@ export class Viewport implements Painter {
     this.#drawnSize = '';
   }
 
-  /** Settings of a frame; with settings of motion where there are some. */
+  /** Settings of a frame; including those of motion, if there are any. */
   #settings(settings?: Partial<PerFrameSettings>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { quality, shDegree, order } = this.#rendering;
-    // Whichever leaves out more: what the page asks for, or the pace.
+    // The larger error: of the page's setting and of dynamic quality.
     const most = Math.max(detail, settings?.detail ?? 0);
     return {
       quality,
@@ -140,7 +143,7 @@ export class Viewport implements Painter {
   }
 
   #renderOnce(frame: Frame, content: string, onTime: ((time: WorkTime) => void) | undefined): void {
-    // A lost device has been noticed elsewhere.
+    // A lost device is detected by other code.
     if (onTime) this.#clock.time(() => this.#draw(frame, content)).then(onTime, () => undefined);
     else this.#draw(frame, content);
   }
@@ -158,8 +161,9 @@ export class Viewport implements Painter {
   }
 
   /**
-   * Renders the first frame, for which the renderer allocates its buffers, and waits until the GPU has finished it.
-   * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
+   * Renders the first frame, which makes the renderer allocate its buffers, and waits until the GPU has finished it.
+   * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU reports a failed allocation only through an error
+   * scope.
    */
   async renderFirst(request: CanvasFrame, content: string): Promise<void> {
     const frame = frameOf(request);
@@ -167,14 +171,14 @@ export class Viewport implements Painter {
     const error = await this.#withRefusal(() => this.#draw(frame, content));
     if (error) throw await why(({ outOfMemory }) => outOfMemory('first frame', error));
     await this.finished();
-    // The GPU has nothing to do now. Nobody waits for it.
+    // The GPU is idle now. The result is not awaited.
     this.#clock.calibrate().catch(() => undefined);
   }
 
-  /** Fulfils with what the device says if memory was lacking for some work. */
+  /** Resolves with the device's error if some work ran out of memory. */
   #withRefusal(work: () => void): Promise<GPUError | null> {
     const { device } = this;
-    // A lost device closes no scopes; its loss is reported elsewhere.
+    // A lost device resolves no scopes; its loss is reported by other code.
     const refusal = (): Promise<GPUError | null> => device.popErrorScope().catch(() => null);
     device.pushErrorScope('out-of-memory');
     try {
@@ -195,12 +199,12 @@ export class Viewport implements Painter {
     return readCounts(this, camera);
   }
 
-  /** What it draws at rest. */
+  /** The view at rest. */
   get view(): Counted['view'] {
     return { world: this.#contents.world, settings: this.#settings(), filter: this.#rendering.filter };
   }
 
-  /** Fulfils when all that was submitted is done, or the device is lost. */
+  /** Resolves when all submitted work is done, or the device is lost. */
   finished(): Promise<unknown> {
     return this.device.queue.onSubmittedWorkDone().catch(() => undefined);
   }
@@ -215,7 +219,7 @@ export class Viewport implements Painter {
 
 const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
 
-/** What the canvas is made of. */
+/** Format of the canvas. */
 export const canvasFormat = (): GPUTextureFormat => navigator.gpu.getPreferredCanvasFormat();
 
 const frameOf = ({ surface, ...frame }: CanvasFrame): Frame => ({
@@ -223,7 +227,7 @@ const frameOf = ({ surface, ...frame }: CanvasFrame): Frame => ({
   target: (surface as GPUCanvasContext).getCurrentTexture(),
 });
 
-/** Compute shaders may then write the canvas itself, where the device lets them. */
+/** Compute shaders may then write to the canvas directly, if the device supports it. */
 function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
   const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
   const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');

@@ -1,4 +1,4 @@
-/** Loaded only when a clip is shown. */
+/** Loaded only for clips. */
 import { clipGroupAt, frameAt, type ClipIndex } from '@gaussian-splat/formats';
 import { AnimatedGaussians } from '@gaussian-splat/renderer';
 import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
@@ -17,12 +17,15 @@ export interface ClipOptions {
   readonly signal: AbortSignal;
   readonly listeners: LiveListeners;
   readonly loops: () => boolean;
-  /** Where it begins, seconds. */
+  /** Start position in seconds. */
   readonly startSeconds: number;
   readonly memoryBudget: number | undefined;
 }
 
-/** Plays a clip: groups of frames are fetched ahead by byte ranges, uploaded once each, and their frames made on the GPU. */
+/**
+ * Plays a clip: groups of frames are fetched ahead by byte ranges, uploaded once each, and their frames evaluated on
+ * the GPU.
+ */
 export class ClipPlayer implements Timeline {
   readonly gaussians: AnimatedGaussians;
   readonly bounds: SceneBounds;
@@ -43,7 +46,7 @@ export class ClipPlayer implements Timeline {
     this.#slots = new GroupSlots(gaussians, index);
   }
 
-  /** With a coarse image of the first frame. Rejects with GaussianSplatError, or the signal's reason. */
+  /** Opens a clip with a coarse image of the first frame. Rejects with GaussianSplatError, or the signal's reason. */
   static async open(options: ClipOptions): Promise<ClipPlayer> {
     const { device, loader, request, signal, memoryBudget, startSeconds, listeners } = options;
     const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part'>, aborted: AbortSignal): Promise<T> => {
@@ -86,7 +89,7 @@ export class ClipPlayer implements Timeline {
     }
   }
 
-  /** Groups that are in the page's memory, or on their way. */
+  /** Number of groups in memory, or in transit. */
   get heldGroups(): number {
     return this.#cache.held;
   }
@@ -109,7 +112,7 @@ export class ClipPlayer implements Timeline {
     return !this.#cache.get(group, 0) && !this.#cache.isMissing(group, 0);
   }
 
-  /** Shows the frame of a time, if it is there; sees to those that follow. */
+  /** Shows the frame at a time, if it is loaded; fetches the following ones. */
   request({ timeSeconds }: Pick<LiveState, 'timeSeconds'>): void {
     const frame = frameAt(this.#index, timeSeconds);
     const group = clipGroupAt(this.#index, frame);
@@ -125,7 +128,7 @@ export class ClipPlayer implements Timeline {
   }
 }
 
-/** What the parts of any group need at most. */
+/** Largest sizes of the parts over all groups. */
 function roomOf({ groups }: ClipIndex): { rows: number; planes: number; frames: number }[] {
   const room: { rows: number; planes: number; frames: number }[] = [];
   for (const { frames, parts } of groups) {
@@ -139,7 +142,7 @@ function roomOf({ groups }: ClipIndex): { rows: number; planes: number; frames: 
   return room;
 }
 
-/** A file that the page has itself. */
+/** A local file of the page. */
 async function localFile(url: string): Promise<Blob | undefined> {
   return url.startsWith('blob:') ? (await fetch(url)).blob() : undefined;
 }

@@ -1,4 +1,4 @@
-/** Loaded only for the attribute `controls-panel`, and where a model takes anything. */
+/** Loaded only for the attribute `controls-panel`, if a model has inputs. */
 import { css, type ReactiveElement } from 'lit';
 import { adoptStyles } from '../styles.js';
 import { readSpokenStrings, type SpokenStrings } from '../words.js';
@@ -6,7 +6,7 @@ import type { GeneratorInput } from './inputs.js';
 import { poseOf, turnsOf } from './pose-of.js';
 import { readNumbers, valueOf, type ControlValues, type Numbers } from './values.js';
 
-/** What the panel says, in English. The keys are those of `a11y`, too. */
+/** Texts of the panel in English. Their keys are also keys of `a11y`. */
 export const PANEL_WORDS = {
   'controls-panel': 'Controls',
   'controls-reset': 'Reset',
@@ -15,9 +15,9 @@ export const PANEL_WORDS = {
   'controls-scene': 'Scene',
 } as const;
 
-/** Numbers of one input that get a slider each; more are a page's own business. */
+/** Maximum number of sliders for one input; larger ones are left to the page. */
 const MOST_SLIDERS = 24;
-/** Of coefficients whose range no contract says: standard deviations of bodies. */
+/** Range of coefficients without a declared one: standard deviations of body shapes. */
 const SHAPE_RANGE = [-3, 3] as const;
 const SLIDER_STEPS = 200;
 const SLIDES = ['control', 'shape'];
@@ -68,7 +68,7 @@ const STYLES = css`
   }
 `;
 
-/** Whose inputs are set: the element, or a `<splat-scene>` in it. */
+/** Owner of the inputs: the element, or a `<splat-scene>` in it. */
 interface Owner extends HTMLElement, Pick<ReactiveElement, 'addController'> {
   readonly inputs: readonly GeneratorInput[];
   inputValues: ControlValues | null;
@@ -77,7 +77,7 @@ interface Owner extends HTMLElement, Pick<ReactiveElement, 'addController'> {
 
 type Pose = Numbers | null | undefined;
 
-/** What the panel sees of its element. */
+/** Interface of the element for the panel. */
 interface PanelHost extends Owner {
   readonly controlsPanel: boolean;
   readonly a11y: unknown;
@@ -87,16 +87,19 @@ interface PanelHost extends Owner {
 
 const panels = new WeakMap<PanelHost, ControlsPanel>();
 
-/** Controls for visitors, made from what the models on show take. */
+/** Controls for visitors, generated from the inputs of the current models. */
 export class ControlsPanel {
   readonly #element: PanelHost;
   readonly #strings: SpokenStrings;
   readonly #box: HTMLElement;
-  /** Of those with rotations of joints, which people turn as axis-angle: the pose that the page has given, and the one that was read or turned last. */
+  /**
+   * For poses with joint rotations, which visitors edit as axis-angle: the pose of the page, and the last one that was
+   * read or edited.
+   */
   readonly #poses = new Map<Owner, { given: Pose; last: Pose }>();
-  /** Those whose values it follows. */
+  /** Owners whose values it follows. */
   readonly #followed = new WeakSet<Owner>();
-  /** Each shows the value that its control has by now. */
+  /** Functions that update each control to its current value. */
   #followers: (() => void)[] = [];
   #told = '';
 
@@ -110,21 +113,21 @@ export class ControlsPanel {
     element.addEventListener('inputs-change', () => this.#update());
     element.addEventListener('timeupdate', () => this.#follow());
     element.addEventListener('emptied', () => this.#update());
-    // Inputs of a child that is removed are no longer controlled; its events do not reach the element.
+    // Inputs of a removed child are no longer controlled; its events do not reach the element.
     new MutationObserver(() => this.#update()).observe(element, {
       attributeFilter: ['controls-panel'],
       childList: true,
     });
   }
 
-  /** The panel of an element: made at the first call. */
+  /** Returns the panel of an element, created at the first call. */
   static show(element: PanelHost): void {
     const panel = panels.get(element) ?? new ControlsPanel(element);
     panels.set(element, panel);
     panel.#update();
   }
 
-  /** Builds the controls anew where there are others than before. */
+  /** Rebuilds the controls if their set has changed. */
   #update(): void {
     const owners = this.#owners;
     this.#box.hidden = !this.#element.controlsPanel || owners.length === 0;
@@ -133,7 +136,7 @@ export class ControlsPanel {
     this.#told = told;
     this.#followers = [];
     for (const owner of owners) {
-      // What a page sets is shown, too.
+      // Values that the page sets are shown, too.
       if (!this.#followed.has(owner)) owner.addController({ hostUpdated: () => this.#follow() });
       this.#followed.add(owner);
     }
@@ -160,20 +163,20 @@ export class ControlsPanel {
     for (const follow of this.#followers) follow();
   }
 
-  /** A slider that shows a value which others may set, too. */
+  /** A slider for a value that other code may set, too. */
   #slider(...[title, range, step, now, onValue]: Parameters<typeof slider>): HTMLElement {
     const control = slider(title, range, step, now, onValue);
     this.#followers.push(() => showValue(control, now()));
     return control;
   }
 
-  /** The element and its children, as far as they have inputs. */
+  /** The element and its children that have inputs. */
   get #owners(): readonly Owner[] {
     const children = [...this.#element.children] as Element[] as Owner[];
     return [this.#element, ...children].filter(({ inputs = [] }) => inputs.length > 0);
   }
 
-  /** What a child is called: by its title or id, or else by its number. */
+  /** Name of a child: its title or id, or else its index. */
   #titleOf(owner: Owner): string {
     return (
       owner.title || owner.id || `${this.#word('controls-scene')} ${[...this.#element.children].indexOf(owner) + 1}`
@@ -216,7 +219,7 @@ export class ControlsPanel {
     return labelled(label, field);
   }
 
-  /** A joint is chosen, and turned around its three axes. */
+  /** Controls to select a joint and rotate it around its three axes. */
   #pose(owner: Owner, input: GeneratorInput): HTMLElement[] {
     const { format = 'parameters', joints, size } = input;
     const perJoint = { 'axis-angle': 3, quaternion: 4, matrix: 9, parameters: 0 }[format];
@@ -230,7 +233,7 @@ export class ControlsPanel {
       return numbers?.length === size ? turnsOf(numbers, input) : [...none];
     };
     let turns = turnsNow();
-    /** As the page has set them, or as they were turned here: whole turns do not come back from a pose. */
+    /** Values of the page, or as edited here, because a pose does not preserve full turns. */
     const read = (): number[] => {
       if (owner.pose === pose.last) return turns;
       pose.given = pose.last = owner.pose;
@@ -286,7 +289,7 @@ export class ControlsPanel {
   }
 }
 
-/** What the page has set of an input. */
+/** Value of an input that the page has set. */
 function valuesOf(owner: Owner, name: string): readonly number[] | undefined {
   const found = valueOf(owner.inputValues ?? {}, name);
   return readNumbers((found as Numbers | undefined) ?? owner.getAttribute(`control-${name.toLowerCase()}`));
@@ -296,7 +299,7 @@ function set(owner: Owner, name: string, value: ControlValues[string]): void {
   owner.inputValues = { ...owner.inputValues, [name]: value };
 }
 
-/** All numbers of an input where nothing is set. */
+/** Default numbers of an input. */
 const numbersOf = ({ default: initial = 0 }: GeneratorInput): readonly number[] =>
   typeof initial === 'number' ? [initial] : initial;
 
@@ -309,7 +312,7 @@ function slider(
 ): HTMLElement {
   const field = make('input', { type: 'range', part: 'control-input' });
   Object.assign(field, { min: String(min), max: String(max), step: String(step) });
-  // Not an output: a label is that of the first such element in it. A range says its value itself.
+  // Not an output element, because a label applies to the first one in it. A range reports its own value.
   const shown = make('span', { part: 'control-value', ariaHidden: 'true' });
   const control = labelled(title, field, shown);
   field.addEventListener('input', () => {

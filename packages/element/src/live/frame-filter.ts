@@ -8,27 +8,27 @@ export interface Frame {
   readonly target: GPUTexture;
   /** Premultiplied. */
   readonly background?: Rgba | undefined;
-  /** What is other than at rest. */
+  /** Settings that differ from those at rest. */
   readonly settings?: Partial<PerFrameSettings> | undefined;
   /** Takes the depth of the splats, too. */
   readonly depth?: SceneDepth | undefined;
 }
 
-/** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */
+/** A filter between the renderer and the canvas. Independent of the runtime, which is loaded on demand. */
 export interface FrameFilter {
-  /** What the page may set. */
+  /** Inputs that the page may set. */
   readonly inputs: readonly GeneratorInput[];
   /** Settings that the frames which it takes need. */
   readonly settings?: Partial<RenderSettings> | undefined;
-  /** Bytes of GPU memory that its own pictures take. */
+  /** Bytes of GPU memory of its own images. */
   readonly byteLength: number;
   /**
    * Shows a frame.
-   * @param content changes whenever the same camera would give another picture
-   * @param draw renders the frame into the target that it names
+   * @param content Changes whenever the same camera would give another frame.
+   * @param draw Renders the frame into the given target.
    */
   render(frame: Frame, content: string, draw: (frame: Frame) => void): void;
-  /** The frame drawn last lacked something: it is drawn again. */
+  /** Call if the last frame was incomplete and is drawn again. */
   invalidate(): void;
   close(): void;
 }

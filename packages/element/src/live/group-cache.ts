@@ -4,21 +4,24 @@ import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 
 export interface GroupSource {
   fetchPart(group: number, part: number, signal: AbortSignal): Promise<PackedAnimation>;
-  /** A part has come. */
+  /** Called when a part has arrived. */
   onArrival(): void;
-  /** A part cannot be had: told once. */
+  /** Called once when a part is unavailable. */
   onError(error: unknown): void;
 }
 
-/** How far ahead groups are fetched; the next one always is. */
+/** Prefetch time of groups; the next one is always fetched. */
 const AHEAD_SECONDS = 6;
-/** Bytes of groups that are kept in the page's memory; that on show and the next one always are. */
+/** Maximum total size of groups in memory; the current and the next one are always kept. */
 const MOST_BYTES = 160 << 20;
-/** Milliseconds before a part that did not come is asked for again, four times as many after each further failure, and how often it is asked for at all. */
+/**
+ * Milliseconds before a failed part is requested again, four times as many after each further failure, and the maximum
+ * number of attempts.
+ */
 const RETRY_MS = 5_000;
 const MOST_TRIES = 4;
 
-/** What is known of a part. */
+/** State of a part. */
 interface Entry {
   readonly group: number;
   readonly part: number;
@@ -26,7 +29,7 @@ interface Entry {
   abort?: AbortController;
 }
 
-/** Groups of a clip in the page's memory: fetched ahead one part after the other, and dropped where there is no room, those behind the time first. */
+/** Groups of a clip in memory: fetched ahead part by part, and discarded if the memory is full, past ones first. */
 export class GroupCache {
   readonly #index: ClipIndex;
   readonly #source: GroupSource;
@@ -41,7 +44,7 @@ export class GroupCache {
     this.#source = source;
   }
 
-  /** Groups of which something is there or on its way. */
+  /** Number of groups with parts in memory or in transit. */
   get held(): number {
     return new Set(
       [...this.#entries.values()].filter(({ content, abort }) => content ?? abort).map(({ group }) => group),
@@ -52,18 +55,18 @@ export class GroupCache {
     return this.#entries.get(keyOf(group, part))?.content;
   }
 
-  /** True of a part that has not come, until it is asked for again. */
+  /** Whether a part has failed, until it is requested again. */
   isMissing(group: number, part: number): boolean {
     return this.#failures.isPaused(keyOf(group, part));
   }
 
-  /** Fetches what the first frame needs. Rejects with what was thrown. */
+  /** Fetches the parts for the first frame. Rejects with the thrown error. */
   async first(group: number, signal: AbortSignal): Promise<void> {
     const content = await this.#source.fetchPart(group, 0, signal);
     this.#entries.set(keyOf(group, 0), { group, part: 0, content });
   }
 
-  /** The group whose frames are shown now. */
+  /** Sets the current group. */
   want(group: number, loops: boolean): void {
     const key = `${group} ${loops}`;
     if (key !== this.#wantedFor) {
@@ -84,7 +87,7 @@ export class GroupCache {
     this.#entries.clear();
   }
 
-  /** A coarse image of what comes next is worth more than a fine one of what is on show. */
+  /** A coarse version of the next group has priority over a fine one of the current group. */
   #wantedFrom(group: number, loops: boolean): (readonly [number, number])[] {
     const { groups, framesPerSecond } = this.#index;
     const ahead: number[] = [];
@@ -113,14 +116,14 @@ export class GroupCache {
     if (this.#isClosed) return;
     for (const { abort } of this.#entries.values()) if (abort) return;
     const due = this.#wanted.find(
-      // What makes a group finer is of no use without its coarse part.
+      // Refinements of a group are useless without its coarse part.
       ([group, part]) => !this.get(group, part) && !this.isMissing(group, part) && (part === 0 || this.get(group, 0)),
     );
     if (!due || !this.#makeRoom(due)) return;
     void this.#fetch(due);
   }
 
-  /** Drops what is not wanted, the oldest first, until a part has room. False if it has none all the same, and can wait. */
+  /** Discards unneeded parts, oldest first, until a part fits. False if it does not fit and can wait. */
   #makeRoom([group, part]: readonly [number, number]): boolean {
     const needed = this.#bytesOf(group, part);
     const kept = [...this.#entries].filter(([, { content }]) => content);

@@ -2,18 +2,18 @@ import type { ClipIndex } from '@gaussian-splat/formats';
 import { ANIMATION_SLOTS, type AnimatedGaussians } from '@gaussian-splat/renderer';
 import type { GroupCache } from './group-cache.js';
 
-/** Bytes that a frame uploads of what is not needed at once. */
+/** Bytes of parts that are not needed at once to upload in each frame. */
 const BYTES_PER_FRAME = 1 << 20;
 
-/** Which groups are on the GPU, and what of them is on show. */
+/** Tracks which groups are on the GPU, and the shown frame. */
 export class GroupSlots {
   readonly #gaussians: AnimatedGaussians;
   readonly #index: ClipIndex;
-  /** Number of the group in each slot; -1 for none. */
+  /** Index of the group in each slot; -1 for none. */
   readonly #groups = new Array<number>(ANIMATION_SLOTS).fill(-1);
   #shownFrame = -1;
   #shownSlot = 0;
-  /** Parts of the group that the frame on show was made of. */
+  /** Parts of the group in the shown frame. */
   #shownParts = 0;
 
   constructor(gaussians: AnimatedGaussians, index: ClipIndex) {
@@ -21,14 +21,14 @@ export class GroupSlots {
     this.#index = index;
   }
 
-  /** Of the clip. */
+  /** Index of the frame in the clip. */
   get shownFrame(): number {
     return this.#shownFrame;
   }
 
   /**
-   * Shows a frame of a group, as far as its parts are there, and uploads what is needed next.
-   * @returns whether there is more to upload
+   * Shows a frame of a group with the parts that are loaded, and uploads the next ones.
+   * @returns Whether there is more to upload.
    */
   show(frame: number, group: number, cache: GroupCache): boolean {
     const gaussians = this.#gaussians;

@@ -1,37 +1,37 @@
 import type { InputBinding } from '@gaussian-splat/core/contract';
 import type { GeneratorModel } from '@gaussian-splat/generator';
 
-/** What a page may set of a model, from its contract: enough to make controls for visitors. */
+/** An input of a model that a page may set, from its contract: enough to create controls for visitors. */
 export interface GeneratorInput {
-  /** As in `inputValues` and `control-NAME`. */
+  /** Name as in `inputValues` and `control-NAME`. */
   readonly name: string;
   /**
-   * `control`, `shape`, `image`: set by `control-NAME` or `inputValues`; `pose`: by `pose`; `time`, `frame`: by `currentTime`. Others, such as `view`, are fed by the
-   * element itself.
+   * `control`, `shape`, `image`: set by `control-NAME` or `inputValues`; `pose`: by `pose`; `time`, `frame`: by
+   * `currentTime`. Others, such as `view`, are set by the element itself.
    */
   readonly role: Exclude<InputBinding['role'], 'gaussians' | 'depth' | 'state'>;
   /** For readers. */
   readonly label: string;
-  /** Numbers that it takes; of an image 0. */
+  /** Number of its elements; 0 for an image. */
   readonly size: number;
-  /** Of each number. */
+  /** Range of each element. */
   readonly range?: readonly [min: number, max: number];
   readonly step?: number;
-  /** Where nothing is set: all numbers, or one for all. */
+  /** Default: all elements, or one number for all. */
   readonly default?: number | readonly number[];
   /** Of a pose. */
   readonly format?: 'axis-angle' | 'quaternion' | 'matrix' | 'parameters';
   readonly quaternionOrder?: 'wxyz' | 'xyzw';
   readonly joints?: readonly string[];
-  /** For each joint the index of its parent, -1 for roots. */
+  /** Index of the parent of each joint, -1 for roots. */
   readonly parents?: readonly number[];
-  /** Of the coefficients of a shape. */
+  /** Names of the coefficients of a shape. */
   readonly names?: readonly string[];
-  /** Images that an image takes, in one tensor. */
+  /** Number of images in one tensor, for an image. */
   readonly views?: number;
 }
 
-/** The inputs of models that run one after the other, each name once. */
+/** The inputs of models in a chain, each name once. */
 export function inputsOf(models: readonly GeneratorModel[]): readonly GeneratorInput[] {
   const found = new Map<string, GeneratorInput>();
   for (const { header, contract } of models) {

@@ -6,78 +6,78 @@ import type { SceneLimits } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { ReadControls } from './values.js';
 
-/** What a page says about a model, apart from the camera. Small and capital letters of names are the same. */
+/** State of a model that a page sets, apart from the camera. Names are case-insensitive. */
 export interface LiveState extends ReadControls {
   readonly timeSeconds: number;
   /** Flattened; undefined for the model's rest pose. */
   readonly pose: readonly number[] | undefined;
 }
 
-/** Whom a model tells. */
+/** Listeners of a model. */
 export interface LiveListeners {
-  /** A frame for a time is ready to be drawn. */
+  /** Called when a frame for a time is ready to be drawn. */
   readonly onFrame: (timeSeconds: number) => void;
-  /** The frame of a time is on show, as of the picture that is being drawn. */
+  /** Called when the frame at a time is shown by the frame being drawn. */
   readonly onShown: (timeSeconds: number) => void;
-  /** A run failed; the last good frame stays. */
+  /** Called when a run fails; the last good frame stays. */
   readonly onError: (error: unknown) => void;
-  /** The model runs on the CPU. */
+  /** Called when the model runs on the CPU. */
   readonly onFallback: (reason: string) => void;
-  /** Something that the next run takes has arrived: a picture. */
+  /** Called when an input of the next run has arrived: an image. */
   readonly onInput: () => void;
 }
 
-/** What changes the Gaussians of a scene as time goes on: a generator, or a sequence of files. */
+/** Changes the Gaussians of a scene over time: a generator, or a sequence of files. */
 export interface Timeline {
-  /** Bounds of the Gaussians as they are now; absent where those of the first frame count. */
+  /** Current bounds of the Gaussians; absent if those of the first frame apply. */
   readBounds?(): Promise<SceneBounds>;
-  /** Where the Gaussians are: as the contract declares, or as of the last runs. */
+  /** Bounds of the Gaussians: those of the contract, or of the last runs. */
   readonly bounds?: SceneBounds;
-  /** Seconds; Infinity where the contract declares none. */
+  /** Duration in seconds; Infinity if the contract declares none. */
   readonly duration: number;
-  /** What the page may set; absent where there is nothing. */
+  /** Inputs that the page may set; absent if there are none. */
   readonly inputs?: readonly GeneratorInput[];
-  /** Inputs that `control-NAME` sets; absent where there are none. */
+  /** Inputs that `control-NAME` sets; absent if there are none. */
   readonly settable?: readonly string[];
-  /** Asks for the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
+  /** Requests the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
   request(state: LiveState, camera: Camera): void;
-  /** Where nothing can be shown yet that the time asks for, the clock waits; absent where it never does. */
+  /** Whether the frame at a time is not loaded, so that the clock waits; absent if it never waits. */
   isLacking?(timeSeconds: number): boolean;
   /** [start, end] of the times that need no more bytes, seconds; absent for all. */
   readonly buffered?: readonly (readonly [start: number, end: number])[];
   close(): void;
 }
 
-/** A generator behind a scene, with the first frame in its Gaussians. */
+/** The generator of a scene, with the first frame in its Gaussians. */
 export interface LiveModel extends Timeline {
   readonly gaussians: DynamicGaussians;
   readonly bounds: SceneBounds;
 }
 
-/** Where the generator is, and what its first frame shows. */
+/** Location of a generator, and the state of its first frame. */
 export interface LiveRequest {
   readonly url: string;
-  /** Addresses of models that each take the Gaussians of the one before. */
+  /** Addresses of models that each receive the Gaussians of the previous one. */
   readonly chain?: readonly string[];
-  /** Address of a contract, its JSON text, or the contract itself; null for that of the model or beside it. */
+  /** Address of a contract, its JSON text, or the contract itself; null for that of the model or its sidecar. */
   readonly contract?: unknown;
   readonly credentials: RequestCredentials;
-  /** Bytes of GPU memory that the Gaussians may take; undefined for no limit but the device's. */
+  /** Upper limit of the GPU memory of the Gaussians in bytes; undefined for no limit but the device's. */
   readonly memoryBudget: number | undefined;
-  /** The element that shows it: only code that is loaded for generators reads its attribute `compare`. */
+  /** The element that shows it: only code that is loaded for generators reads its attribute `gpu-check`. */
   readonly element: HTMLElement;
   /** Folder of the runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
-  /** Has workers: one that reads the header, and one that runs a model on the CPU when asked. */
+  /** Provides workers: one that reads the header, and one that runs a model on the CPU on request. */
   readonly loader: SceneLoader;
-  /** What the model may cost. */
+  /** Limits of the model's load. */
   readonly limits?: SceneLimits | undefined;
   readonly state: () => LiveState;
-  /** Whether the time begins again at its end. */
+  /** Whether playback restarts at its end. */
   readonly loops: () => boolean;
-  /** False where controls may be another model's, which then reports what neither knows. */
+  /** False if controls may belong to another model, which then reports unknown ones. */
   readonly ownsControls: () => boolean;
-  /** A camera before anything is known of the scene but, perhaps, the bounds that the contract declares. */
+  /** A camera for the bounds that the contract declares, or for unknown ones. */
   readonly camera: (bounds: SceneBounds | undefined) => Camera;
   readonly listeners: LiveListeners;
 }

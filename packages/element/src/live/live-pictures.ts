@@ -4,23 +4,26 @@ import { ImageTensor, type ImageShape } from '@gaussian-splat/renderer';
 import { fetchBeside } from './model-files.js';
 import { valueOf, type ImageSource, type ImageSources } from './values.js';
 
-/** Bytes of an image file. */
+/** Maximum size of an image file in bytes. */
 const MAX_IMAGE = 2 ** 28;
 
 export interface LivePicturesOptions {
   readonly credentials: RequestCredentials;
   readonly signal: AbortSignal;
-  /** All pictures that were named have arrived, or failed. */
+  /** Called when all named images have arrived, or failed. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
-  /** Fulfils when no run reads a picture. */
+  /** Resolves when no run reads an image. */
   readonly whenIdle: () => Promise<void>;
 }
 
 /** Size of a tensor as far as the model fixes it. */
 type WantedShape = ReturnType<typeof imageShapeOf>;
 
-/** The pictures that models take as inputs: fetched, cut to the model's proportions and resampled on the GPU whenever the page names others. */
+/**
+ * Image inputs of models: fetched, cropped to the model's proportions and resampled on the GPU whenever the page names
+ * others.
+ */
 export class LivePictures {
   readonly #device: GPUDevice;
   readonly #options: LivePicturesOptions;
@@ -30,7 +33,7 @@ export class LivePictures {
   readonly #loading = new Set<Promise<void>>();
   #isDestroyed = false;
 
-  /** @param models whose inputs of the role image are the page's, but for those in `given` */
+  /** @param models Models whose image inputs the page sets, except for those in `given`. */
   constructor(
     device: GPUDevice,
     models: readonly GeneratorModel[],
@@ -47,27 +50,27 @@ export class LivePictures {
     }
   }
 
-  /** Those that have arrived, by the names of inputs. */
+  /** Received images by the names of inputs. */
   get tensors(): Readonly<Record<string, GpuTensor>> {
     return this.#tensors;
   }
 
-  /** True while a picture is on its way. What else the page has said since may belong to that one. */
+  /** Whether an image is in transit. Other state of the page may belong to it. */
   get isLoading(): boolean {
     return this.#loading.size > 0;
   }
 
-  /** True if every input has its pictures, and none is on its way. */
+  /** Whether every input has its images, and none is in transit. */
   get areComplete(): boolean {
     return !this.isLoading && [...this.#shapes.keys()].every((name) => name in this.#tensors);
   }
 
-  /** Fulfils, and never rejects, once nothing is on its way. */
+  /** Resolves, and never rejects, once nothing is in transit. */
   async settled(): Promise<void> {
     while (this.#loading.size > 0) await Promise.all(this.#loading);
   }
 
-  /** The pictures that the page names now; only new ones are loaded. */
+  /** Sets the current images of the page; only new ones are loaded. */
   update(pictures: Readonly<Record<string, ImageSources>>): void {
     for (const name of this.#shapes.keys()) {
       const source = valueOf(pictures, name);
@@ -81,7 +84,7 @@ export class LivePictures {
     }
   }
 
-  /** To be called after the model is closed. */
+  /** Call after the model is closed. */
   destroy(): void {
     this.#isDestroyed = true;
     void this.#options.whenIdle().then(() => Object.values(this.#tensors).forEach((tensor) => tensor.destroy()));
@@ -103,7 +106,7 @@ export class LivePictures {
         const tensor = this.#tensorFor(name, all[0]);
         all.forEach((pixels, view) => tensor.upload(pixels, 'cover', view));
       } finally {
-        // Made here, whether or not another has taken its place.
+        // Closed in any case, even if another one has replaced it.
         for (const pixels of made) pixels.close();
       }
     } catch (error) {
@@ -122,7 +125,7 @@ export class LivePictures {
   }
 }
 
-/** As many pictures as the input takes: a list, or addresses with spaces between them. */
+/** The images of an input: a list, or addresses separated by spaces. */
 function listed(name: string, source: ImageSources, views: number): readonly ImageSource[] {
   const text = typeof source === 'string' && views > 1 ? source.trim().split(/\s+/) : source;
   const list = Array.isArray(text) ? (text as readonly ImageSource[]) : [text as ImageSource];
@@ -154,7 +157,7 @@ async function pixelsOf(
   }
   if (typeof source !== 'string' && !(source instanceof Blob)) return source;
   const blob = typeof source === 'string' ? await fetchPicture(source, options) : source;
-  // Of what the file says only the turning counts: colours stay as they are encoded.
+  // Only the orientation of the file is applied; colors stay as encoded.
   return createImageBitmap(blob, { imageOrientation: 'from-image', premultiplyAlpha: 'premultiply' }).catch(
     (cause: unknown) => {
       throw unreadable(name, typeof source === 'string' ? source : source.type, cause);

@@ -9,7 +9,7 @@ import type { LiveListeners, LiveState } from './live-model.js';
 import type { Painter } from '../gpu/painter.js';
 import type { PostHost } from './post-controller.js';
 
-/** Whom the models of an element meet. */
+/** Interface of the element for its models. */
 export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
   readonly playback: PlaybackController;
   /** The sources that are drawn. */
@@ -19,7 +19,7 @@ export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'l
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
 
-/** What the models of an element, a generator and a post-processor, are told and whom they tell. */
+/** Connects the models of an element, a generator and a post-processor, with its state and events. */
 export class LiveWiring implements PostHost {
   readonly #post = new Lazy('the code that runs post-processors', async () => {
     const { PostController } = await import('./post-controller.js');
@@ -29,26 +29,26 @@ export class LiveWiring implements PostHost {
   #painter: Painter | null = null;
   readonly #host: LiveHost;
   #lastFault = '';
-  /** How many inputs there were last. */
+  /** Previous number of inputs. */
   #inputs = 0;
 
   constructor(host: LiveHost) {
     this.#host = host;
   }
 
-  /** True if there is a post-processor, or will be. */
+  /** Whether there is a post-processor, or will be. */
   get hasPost(): boolean {
     return this.#postUrls.length > 0;
   }
 
-  /** @param urls absolute addresses of post-processors, in the order in which they run; none for frames as they are drawn */
+  /** @param urls Absolute addresses of post-processors, in execution order; none for unprocessed frames. */
   wantPost(urls: readonly string[]): void {
     if (urls.join(' ') === this.#postUrls.join(' ')) return;
     this.#postUrls = urls;
     this.#open();
   }
 
-  /** Frames are drawn, or none any more. A painter that is destroyed closes its processor itself. */
+  /** Call when drawing starts or stops. A destroyed backend closes its post-processor itself. */
   attachPost(painter: Painter | null): void {
     this.#painter = painter;
     this.#open();
@@ -82,19 +82,19 @@ export class LiveWiring implements PostHost {
     this.#host.requestFrame();
   }
 
-  /** What the page may set is another thing than before, once what is told of is on show. */
+  /** Reports a change of inputs, after the change is shown. */
   tellInputs(inputs: { readonly length: number } = [0]): void {
     if (inputs.length + this.#inputs > 0) queueMicrotask(() => this.#host.dispatch(new Event('inputs-change')));
     this.#inputs = inputs.length;
   }
 
-  /** What the page says about the models at this time. */
+  /** Current state of the models that the page sets. */
   get state(): LiveState {
     return { ...this.#host.liveValues, timeSeconds: this.#host.playback.currentTime };
   }
 
   get listeners(): LiveListeners {
-    // Which clock a scene follows may change.
+    // The clock of a scene may change.
     const onShown = (timeSeconds: number): void => this.#host.playback.frameShown(timeSeconds);
     return {
       onFrame: (timeSeconds) => {
@@ -109,7 +109,10 @@ export class LiveWiring implements PostHost {
     };
   }
 
-  /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
+  /**
+   * Advances the clock of an animated scene before a frame, and requests its generator's output. The frame does not
+   * wait.
+   */
   advance({ live }: LoadedGaussians, camera: Camera, now: number): void {
     if (live === undefined) return;
     const { playback } = this.#host;
@@ -117,14 +120,14 @@ export class LiveWiring implements PostHost {
     try {
       live.request(this.state, camera);
     } catch (error) {
-      // Values of the page that do not fit the model: told once, not once a frame.
+      // Values of the page that do not match the model are reported once, not in each frame.
       this.#fail(error);
     }
   }
 
   #fail(cause: unknown): void {
     const error = toElementError(cause);
-    // The loss of the device has events of its own.
+    // The loss of the device has its own events.
     if (error.code === 'device-lost' || error.message === this.#lastFault) return;
     this.#lastFault = error.message;
     this.#host.dispatch(new CustomEvent('generator-error', { detail: error }));

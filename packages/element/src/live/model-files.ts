@@ -1,4 +1,4 @@
-/** The files of models: their headers, which a worker reads, and what lies beside them. */
+/** Files of models: their headers, which a worker reads, and companion files. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import type { ModelPlace, OpenedModel } from '@gaussian-splat/core/onnx';
@@ -6,7 +6,7 @@ import type { ModelSource } from '@gaussian-splat/generator';
 import type { SceneLimits } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
-/** Has headers of models read in a worker, within the limits of the page. */
+/** Reads headers of models in a worker, within the limits of the page. */
 export function readsHeaders(loader: SceneLoader, limits: SceneLimits | undefined): ModelSource['openHeader'] {
   return (place: ModelPlace, signal = new AbortController().signal) => {
     const request = { place, limits };
@@ -19,9 +19,9 @@ export function readsHeaders(loader: SceneLoader, limits: SceneLimits | undefine
 
 /**
  * Fetches a contract or an image.
- * @param maxBytes of the file
- * @param expected what the file ought to be, for people
- * @param remedy what to do without it
+ * @param maxBytes Maximum size of the file.
+ * @param expected Description of the expected file, for users.
+ * @param remedy Suggested correction.
  * @throws GaussianSplatError `network/*`; the reason of the signal.
  */
 export async function fetchBeside(

@@ -1,4 +1,4 @@
-/** What only code that is loaded for models reads of their element. */
+/** Attributes of the element that only late-loaded code for models reads. */
 import { Lazy } from '@gaussian-splat/core';
 import type { LiveRequest } from './live-model.js';
 
@@ -7,7 +7,7 @@ interface ModelElement extends HTMLElement {
   readonly controlsPanel?: boolean;
 }
 
-/** What the attribute `compare` asks for; elements within another have no property of it. Anything but "off" is what it is without the attribute. */
+/** Value of the attribute `gpu-check`; child elements have no property for it. Any value but "off" is the default. */
 export const compareOf = ({
   element,
   loader,
@@ -21,11 +21,11 @@ const panel = new Lazy('the code of the panel of controls', () => import('./cont
 
 const offered = new WeakSet<HTMLElement>();
 
-/** From now on the element, or for a child the one around it, has a panel of controls whenever its attribute asks for one. */
+/** Creates the panel of controls of an element, or of a child's parent, whenever its attribute is set. */
 export function offerPanel(element: HTMLElement): void {
   if (offered.has(element)) return;
   offered.add(element);
-  // A child may be moved to another element, and has none when it is taken away.
+  // A child may be moved to another element, and has none after its removal.
   let last: ModelElement | null = null;
   const show = async (): Promise<void> => {
     const owner = ownerOf(element);

@@ -1,4 +1,4 @@
-/** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
+/** Loaded only for generators: only this module and post-view.ts depend on `@gaussian-splat/generator`. */
 import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
@@ -21,32 +21,33 @@ import type { Contract } from '@gaussian-splat/core/contract';
 import { parseUp } from '../camera/grammar.js';
 import type { SceneBounds } from '../camera/settings.js';
 
-/** Bytes of a contract. */
+/** Maximum size of a contract in bytes. */
 const MAX_CONTRACT = 2 ** 20;
 
-/** What a contract says of where its Gaussians are: bounds of the centres are those of the subject, too. Undefined where it says nothing. */
+/** Bounds from a contract: those of the centers also apply to the subject. Undefined if it declares none. */
 export function declaredBounds(contract: Contract): SceneBounds | undefined {
   const { bounds } = contract;
   if (bounds === undefined) return undefined;
   const { min, max } = bounds;
   const center = [0, 1, 2].map((axis) => (min[axis] + max[axis]) / 2) as [number, number, number];
   const sides = [0, 1, 2].map((axis) => max[axis] - min[axis]);
-  // Centres fill a box's corners seldom: the ball that 90 % of them are in is smaller than the one around the box, but what is long reaches both of its ends.
+  // Centers rarely fill the corners of a box: the sphere with 90 % of them is smaller than the one around the box, but
+  // a long subject reaches both of its ends.
   const radius = Math.max(0.7 * Math.hypot(...sides), ...sides) / 2 || 1;
   return { min, max, center, radius, up: upOf(contract) };
 }
 
-/** The direction that points up by a contract, of length 1; undefined where it says nothing. */
+/** Unit vector of a contract that points up; undefined if it declares none. */
 export const upOf = ({ coordinates }: Contract): Vector3 | undefined =>
   parseUp(coordinates?.up?.replace('+', '') ?? '') ?? undefined;
 
 /**
- * Share of the work before a generator's first frame that comes after its bytes: compiling the runtime, making a session, the first runs. How long that
- * takes is known to nobody beforehand; but a bar that is full must not stand still.
+ * Fraction of the progress before a generator's first frame that follows its download: compiling the runtime, creating
+ * a session, the first runs. The duration is unknown beforehand, but a full progress bar must not stop.
  */
 const WARM_UP = 0.25;
 
-/** The scene of a generator. @param lease the caller releases it if this rejects */
+/** Opens the scene of a generator. @param lease The caller releases it if this rejects. */
 export async function openLiveScene(
   request: SceneRequest,
   options: OpenOptions,
@@ -76,7 +77,7 @@ export async function openLiveScene(
   }
 }
 
-/** A generator, once its first run is in its Gaussians. Rejects with GaussianSplatError, or the signal's reason. */
+/** Opens a generator, with its first run in its Gaussians. Rejects with GaussianSplatError, or the signal's reason. */
 async function openLiveModel(
   request: LiveRequest,
   device: GPUDevice,
@@ -103,7 +104,7 @@ async function openLiveModel(
     },
   });
   let watch: RunWatch | undefined;
-  // What nobody waits for any more need not run to its end.
+  // Closed early when it is aborted.
   signal.addEventListener('abort', () => !isOpen && generator.close(), { once: true });
   let gaussians: DynamicGaussians | undefined;
   let pictures: LivePictures | undefined;
@@ -135,7 +136,7 @@ async function openLiveModel(
     signal.throwIfAborted();
     isOpen = true;
     watch = new RunWatch(gaussians, model.header.name, onError, (now, isFirst) => {
-      // The contract speaks of all times.
+      // The contract's bounds cover all times.
       if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };
       if (isFirst) void (request.element as Framed).updateFraming?.();
     });
@@ -178,7 +179,8 @@ function liveModel(
     request: (state, camera) => {
       pictures.update(state.pictures);
       reader.checkPose(state);
-      // Two pictures and the pose of their cameras are one thing: no run may mix old and new. The last one to arrive asks again.
+      // Two images and the pose of their cameras belong together, so no run may mix old and new ones. The last one to
+      // arrive requests again.
       if (!pictures.isLoading)
         generator.request(reader.read(state, camera, pictures.tensors, ownsControls() ? [] : null));
     },
@@ -189,7 +191,7 @@ function liveModel(
   };
 }
 
-/** The generator, and those that follow it in a chain. The contract that the page gives is the first one's. */
+/** Sources of the generator, and of those that follow it in a chain. The contract of the page is that of the first. */
 async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<ModelSource[]> {
   const { url, chain = [], credentials } = request;
   const contract = await contractOf(request, signal);
@@ -199,7 +201,7 @@ async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<Mod
 
 async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<unknown> {
   const { credentials } = request;
-  // Templates write attributes that hold nothing; an empty address would be that of the page.
+  // Templates write empty attributes; an empty address would be that of the page.
   const contract = typeof request.contract === 'string' ? request.contract.trim() : request.contract;
   if (typeof contract !== 'string' || contract === '' || contract.startsWith('{')) return contract || undefined;
   const remedy = 'check the address in the attribute contract, or leave it out';
@@ -208,11 +210,11 @@ async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<un
   return new TextDecoder().decode(bytes);
 }
 
-/** False for what the clock changes nothing of: it has nothing to play. Without `fps` no time tells a frame. */
+/** False if the clock has no effect, so that there is nothing to play. Without `fps` no time determines a frame. */
 const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
   Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
 
-/** The element, as far as it frames its scene: one within another does not. */
+/** The element, if it frames its scene: a child does not. */
 interface Framed extends HTMLElement {
   updateFraming?(): Promise<void>;
 }

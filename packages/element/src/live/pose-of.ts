@@ -1,6 +1,6 @@
 import type { GeneratorInput } from './inputs.js';
 
-/** A pose in the format that an input takes, of rotations as axis-angle in radians, three numbers a joint. */
+/** Converts rotations as axis-angle in radians, three numbers for each joint, to the pose format of an input. */
 export function poseOf(
   turns: readonly number[],
   { format, quaternionOrder }: Pick<GeneratorInput, 'format' | 'quaternionOrder'>,
@@ -16,7 +16,10 @@ export function poseOf(
   }).flat();
 }
 
-/** The other way: axis-angle of no more than half a turn, of a pose as an input takes it. Quaternions and matrices may be of any size. */
+/**
+ * The inverse: axis-angle of at most half a turn from a pose in the format of an input. Quaternions and matrices need
+ * not be normalized.
+ */
 export function turnsOf(
   pose: readonly number[],
   { format, quaternionOrder }: Pick<GeneratorInput, 'format' | 'quaternionOrder'>,
@@ -33,7 +36,7 @@ export function turnsOf(
   }).flat();
 }
 
-/** w x y z of a rotation, row-major: of the four ways to find it the one that divides by most. */
+/** w x y z of a rotation, row-major, by the formula of the four with the largest divisor. */
 function quaternionOf([a, b, c, d, e, f, g, h, i]: readonly number[]): number[] {
   const ways = [
     [1 + a + e + i, h - f, c - g, d - b],

@@ -3,14 +3,17 @@ import { LatestTask } from '../latest-task.js';
 import { PostView, type PostRequest } from './post-view.js';
 
 export interface PostHost {
-  /** What a post-processor needs to know beyond its address. */
+  /** Additional data of a request for a post-processor. */
   readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
   requestFrame(): void;
-  /** There is another filter, or none. */
+  /** Called when there is another filter, or none. */
   tellInputs(): void;
 }
 
-/** Puts the post-processor of the attribute between the frames and the canvas. Until it is there, frames are shown as they are drawn. */
+/**
+ * Inserts the post-processor of the attribute between the frames and the canvas. Until it is loaded, unprocessed frames
+ * are shown.
+ */
 export class PostController {
   readonly #host: PostHost;
   readonly #opening = new LatestTask();
@@ -20,8 +23,8 @@ export class PostController {
   }
 
   /**
-   * @param painter null while nothing is drawn
-   * @param urls in the order in which they run; none for frames as they are drawn
+   * @param painter null while nothing is drawn.
+   * @param urls In execution order; none for unprocessed frames.
    */
   open(painter: Painter | null, urls: readonly string[]): void {
     this.#opening.renew();

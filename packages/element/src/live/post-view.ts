@@ -1,4 +1,4 @@
-/** Loaded only when a post-processor is shown: see open-live-model.ts. */
+/** Loaded only for post-processors: see open-live-model.ts. */
 import { PostProcessor, setRuntimeLocation, type GpuTensor } from '@gaussian-splat/generator';
 import { FilteredFrame } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from './frame-filter.js';
@@ -13,27 +13,31 @@ export interface PostRequest extends Pick<
   LiveRequest,
   'credentials' | 'element' | 'runtimeLocation' | 'loader' | 'limits' | 'state'
 > {
-  /** One post-processor, or several one after the other. */
+  /** One post-processor, or a chain of several. */
   readonly urls: readonly string[];
   readonly signal: AbortSignal;
   /** Inputs of the scene that `control-NAME` sets, too. */
   readonly others: () => readonly string[];
-  /** The picture would be another one now. */
+  /** Called when the frame would change. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
   readonly onFallback: (reason: string) => void;
 }
 
-/** A processor keeps pace from the first time on, ms, and until the second: a run until the GPU has finished it. */
+/**
+ * A post-processor counts as fast enough below the first time, ms, and until it exceeds the second: the duration of a
+ * run until the GPU has finished it.
+ */
 const KEEPS_PACE_MS = 34;
 const LOSES_PACE_MS = 50;
-/** After a failure, before anything else is tried. */
+/** Pause after a failure. */
 const RETRY_MS = 1_000;
 
 /**
- * Shows frames as a post-processor makes them. A frame at rest is always shown processed, as soon as that is ready. While the picture
- * changes, processed frames are shown, one run late, if the processor keeps pace; otherwise the frames as they are drawn. Runs never hold up
- * drawing: a frame goes to the processor when it is free, and only the latest does.
+ * Shows frames through a post-processor. A frame at rest is always shown processed, as soon as the result is ready.
+ * While the frame changes, processed frames are shown, one run late, if the post-processor is fast enough; otherwise
+ * unprocessed ones. Runs never delay drawing: a frame is passed on when the post-processor is free, and only the latest
+ * is.
  */
 export class PostView implements FrameFilter {
   readonly #device: GPUDevice;
@@ -44,13 +48,16 @@ export class PostView implements FrameFilter {
   #surface: FilteredFrame | undefined;
   #tensor: GpuTensor | undefined;
   #depth: GpuTensor | undefined;
-  /** The surface that a run on its way will paint. */
+  /** The target surface of the current run. */
   #pending: FilteredFrame | undefined;
-  /** What was drawn last, what was handed to the processor, and what it has made a picture of. */
+  /** Keys of the last drawn frame, of the post-processor's input, and of its output. */
   #drawn = '';
   #handed = '';
   #filtered = '';
-  /** What the page said when the last run began, and when one failed: that is not tried again, and nothing else before a time, ms. */
+  /**
+   * State at the start of the last run, and of the last failed one: that is not tried again, and nothing else before a
+   * time, ms.
+   */
   #tried = '';
   #failed = '';
   #retryAt = 0;
@@ -107,7 +114,7 @@ export class PostView implements FrameFilter {
     return this.#surface?.byteLength ?? 0;
   }
 
-  /** What the page sets, the picture apart. */
+  /** Inputs that the page sets, without the image. */
   get inputs(): readonly GeneratorInput[] {
     return inputsOf(this.#post.models).filter(({ name }) => name !== this.#post.input.name);
   }
@@ -134,7 +141,10 @@ export class PostView implements FrameFilter {
     this.#retire(surface);
   }
 
-  /** A run on its way may still read what was handed over. Others go at once: many sizes may pass while one run is on its way. */
+  /**
+   * A run in progress may still read the input. Other surfaces are freed at once, because many sizes may occur during
+   * one run.
+   */
   #retire(surface: FilteredFrame | undefined): void {
     if (surface !== this.#pending || !this.#post.isBusy) surface?.destroy();
     else void this.#post.idle.then(() => surface?.destroy());
@@ -149,13 +159,13 @@ export class PostView implements FrameFilter {
     return this.#surface;
   }
 
-  /** All that a run of a picture goes by. */
+  /** Key of everything that a run depends on. */
   #said(key: string): string {
     const { controls, pictures, timeSeconds } = this.#request.state();
     return `${key} ${JSON.stringify([controls, timeSeconds])} ${String(Object.values(pictures))}`;
   }
 
-  /** False for what failed, and for a while after it; then a frame is asked for. */
+  /** False for a failed input, and for a while after a failure; then a frame is requested. */
   #isDue(key: string): boolean {
     const waitMs = this.#retryAt - performance.now();
     if (this.#said(key) === this.#failed) return false;
@@ -164,7 +174,7 @@ export class PostView implements FrameFilter {
     return waitMs <= 0;
   }
 
-  /** Hands the drawn frame over, if it or a control is another one than last time. */
+  /** Passes the drawn frame to the post-processor if it or a control has changed. */
   #offer(surface: FilteredFrame, { camera }: Frame, key: string): void {
     this.#tried = this.#said(key);
     const { input } = this.#post;
@@ -196,7 +206,7 @@ export class PostView implements FrameFilter {
   }
 
   #accept(picture: GpuTensor): void {
-    // The element may have got another size since.
+    // The element may have been resized meanwhile.
     if (this.#pending !== this.#surface || picture.dtype === 'int32') return;
     const { buffer, dims, dtype } = picture;
     this.#surface?.accept({ buffer, dims, dtype });

@@ -4,19 +4,19 @@ import type { GeneratorModel, GeneratorState, GpuTensor } from '@gaussian-splat/
 import type { LiveState } from './live-model.js';
 import { valueOf } from './values.js';
 
-/** Says in a generator's words what the page says. Values that do not fit are mended and reported, each once. */
+/** Converts the state of the page to that of a generator. Invalid values are corrected and reported, each once. */
 export class StateReader {
   readonly #inputs: Contract['inputs'];
   readonly #report: (error: GaussianSplatError) => void;
   readonly #reported = new Set<string>();
 
-  /** @param models whose inputs the page may set */
+  /** @param models Models whose inputs the page may set. */
   constructor(models: readonly GeneratorModel[], report: (error: GaussianSplatError) => void) {
     this.#inputs = merged(models.map(({ contract }) => contract.inputs));
     this.#report = report;
   }
 
-  /** @param others names that another model knows; null where that one reports what neither does */
+  /** @param others Names that another model has; null if that one reports unknown names. */
   read(
     state: LiveState,
     camera: Camera,
@@ -65,7 +65,7 @@ export class StateReader {
     }
   }
 
-  /** Tells of a pose that no model takes. */
+  /** Reports a pose that no model accepts. */
   checkPose({ pose }: LiveState): void {
     if (pose === undefined || Object.values(this.#inputs).some(({ role }) => role === 'pose')) return;
     this.#say('pose', 'none: the model takes no pose', `${pose.length} numbers`, 'leave it out');
@@ -83,7 +83,7 @@ export class StateReader {
   }
 }
 
-/** The inputs of several models. What two of them name the same is one control, whose values must suit both. */
+/** The inputs of several models. Inputs with the same name are one control, whose values must be valid for all. */
 function merged(models: readonly Contract['inputs'][]): Contract['inputs'] {
   const inputs: Record<string, InputBinding> = {};
   for (const [name, binding] of models.flatMap(Object.entries<InputBinding>)) {

@@ -1,20 +1,21 @@
 import type { Bounds } from '@gaussian-splat/core';
 import { ContractError } from '@gaussian-splat/core/contract';
 
-/** After the last run, ms: a look reads all places back, and while runs follow one another there is none. */
+/** Delay after the last run, ms: a sample reads positions back, so there is none during consecutive runs. */
 const REST_MS = 700;
-/** Gaussians up to which there is a look. */
+/** Maximum number of Gaussians for sampling. */
 const MOST = 1_000_000;
 
-/** What a look needs: `DynamicGaussians` of the renderer. */
+/** Interface of `DynamicGaussians` of the renderer. */
 export interface Watched {
   readonly count: number;
   readSample(): Promise<{ readonly bounds: Bounds; readonly drawn: number; readonly unusable: number }>;
 }
 
 /**
- * Looks at the Gaussians once runs have come to rest. Reports once a run whose rows cannot be drawn, for then nothing is seen and nothing has failed; and
- * again after one that could be. Gaussians without opacity are none of that: scenes fade in.
+ * Samples the Gaussians once runs have stopped. Reports a run whose rows are all unusable once, because nothing is
+ * visible although nothing has failed; and again after a usable one. Transparent Gaussians are not reported, because
+ * scenes fade in.
  */
 export class RunWatch {
   readonly #gaussians: Watched;
@@ -24,7 +25,7 @@ export class RunWatch {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isEmpty = false;
 
-  /** @param onBounds gets where they are, and whether none could be drawn at the look before */
+  /** @param onBounds Is called with the bounds, and whether the previous sample had no usable rows. */
   constructor(
     gaussians: Watched,
     where: string,
@@ -37,7 +38,7 @@ export class RunWatch {
     this.#onBounds = onBounds;
   }
 
-  /** A run is on show. Returns at once. */
+  /** Call when a run is shown. Returns at once. */
   frameMade(): void {
     clearTimeout(this.#timer);
     if (this.#gaussians.count > MOST) return;
@@ -50,7 +51,7 @@ export class RunWatch {
 
   async #look(): Promise<void> {
     const sample = await this.#gaussians.readSample().catch(() => undefined);
-    // A scene that was closed meanwhile has nothing to tell.
+    // A closed scene reports nothing.
     if (sample === undefined) return;
     const { bounds, drawn, unusable } = sample;
     const isEmpty = drawn === 0;

@@ -1,4 +1,4 @@
-/** Loaded only when a sequence is shown. */
+/** Loaded only for sequences. */
 import { type Bounds } from '@gaussian-splat/core';
 import { BackOff, partRequest } from '@gaussian-splat/core/fetch';
 import { frameAt, framePath, movedFrame, type SceneSequence } from '@gaussian-splat/formats';
@@ -19,36 +19,39 @@ export interface SequenceOptions {
   readonly frameUrl: (url: string) => string;
   readonly loops: () => boolean;
   readonly memoryBudget: number | undefined;
-  /** The first frame is about to be uploaded: gets its bytes. */
+  /** Called with the size of the first frame before its upload. */
   readonly beforeUpload: (byteLength: number) => void;
 }
 
-/** Frames that are fetched and unpacked at once. */
+/** Number of frames that are fetched and unpacked concurrently. */
 const AT_ONCE = 3;
 
-/** Milliseconds before a frame that did not come is asked for again, four times as many after each further failure, and how often it is asked for at all. */
+/**
+ * Milliseconds before a failed frame is requested again, four times as many after each further failure, and the maximum
+ * number of attempts.
+ */
 const RETRY_MS = 5_000;
 const MOST_TRIES = 4;
 
-/** A frame: on its way, or there. */
+/** A frame in transit, or loaded. */
 interface FetchedFrame {
   readonly abort: AbortController;
   packed?: PackedGaussians;
 }
 
 /**
- * Shows scene files that follow one another in time. The frames ahead are fetched and unpacked in the worker, as many as the memory for them allows; one that is
- * late leaves the last one on show.
+ * Plays a sequence of scene files. The next frames are fetched and unpacked in the worker, as many as the memory limit
+ * allows; if one is late, the previous one stays visible.
  */
 export class SequencePlayer implements Timeline {
   readonly duration: number;
   readonly bounds: Bounds;
-  /** Set once, by whoever makes the scene of it. */
+  /** Set once by the creator of the scene. */
   scene: LoadedGaussians | undefined;
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, FetchedFrame>();
-  /** By the path of the file that did not come. */
+  /** Failures by the path of the file. */
   readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, mostTries: MOST_TRIES });
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
@@ -72,7 +75,7 @@ export class SequencePlayer implements Timeline {
     this.#slots.set(0, { abort: new AbortController(), packed: first.packed });
   }
 
-  /** With its first frame on the GPU. Rejects with GaussianSplatError, or the signal's reason. */
+  /** Opens a sequence with its first frame on the GPU. Rejects with GaussianSplatError, or the signal's reason. */
   static async open(sequence: LoadedSequence, options: SequenceOptions): Promise<SequencePlayer> {
     const { device, signal, onProgress, memoryBudget, beforeUpload } = options;
     const first = await load(sequence, 0, options, 'auto', signal, onProgress);
@@ -88,21 +91,21 @@ export class SequencePlayer implements Timeline {
     return this.#gaussians;
   }
 
-  /** Shows the frame of a time, if it is there; sees to those that follow. */
+  /** Shows the frame at a time, if it is loaded; fetches the following ones. */
   request({ timeSeconds }: LiveState): void {
     const frame = this.#frameAt(timeSeconds);
     this.#showLate(frame);
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
     if (frame !== this.#shown && slot?.packed) this.#show(frame);
-    // A frame that cannot be had is passed over, so that a seek to it ends.
+    // An unavailable frame is skipped, so that a seek to it ends.
     if (frame === this.#shown || this.#isMissing(frame)) this.#tell(timeSeconds);
   }
 
-  /** The newest of those that came after their time: where every frame comes late, pictures follow the clock at a distance. */
+  /** The newest of the late frames: if every frame is late, playback follows the clock with a delay. */
   #showLate(frame: number): void {
     if (this.#slots.get(frame)?.packed) return;
-    // What is on show may be of the round before.
+    // The current frame may belong to the previous loop.
     const before = this.#shown < frame ? this.#shown : -1;
     const late = [...this.#slots.keys()].filter(
       (held) => held > before && held < frame && this.#slots.get(held)!.packed,
@@ -129,12 +132,12 @@ export class SequencePlayer implements Timeline {
     this.#shown = frame;
   }
 
-  /** Once the picture of this moment has been submitted. */
+  /** After the submission of the current frame. */
   #tell(timeSeconds: number): void {
     queueMicrotask(() => this.#isClosed || this.#options.listeners.onShown(timeSeconds));
   }
 
-  /** A frame with more splats than any before gets other buffers; the last one stays on show meanwhile. */
+  /** A frame with more splats than any before gets new buffers; the last one stays visible meanwhile. */
   async #grow(frame: number, packed: PackedGaussians): Promise<void> {
     if (this.#isGrowing) return;
     this.#isGrowing = true;
@@ -147,18 +150,18 @@ export class SequencePlayer implements Timeline {
       this.#shown = -1;
       listeners.onInput();
     } catch (error) {
-      // Passed over like one that cannot be had: there is no room for it, and each frame would ask again.
+      // Skipped like an unavailable one, because it does not fit, and each frame would try again.
       if (this.#slots.get(frame)?.packed === packed) this.#fail(frame, error);
     } finally {
       this.#isGrowing = false;
     }
   }
 
-  /** Fetches what is ahead, the nearest first, and forgets what is not. */
+  /** Fetches the next frames, nearest first, and discards the others. */
   #prefetch(frame: number): void {
     const wanted = this.#wantedFrom(frame);
     for (const [held, { abort, packed }] of this.#slots) {
-      // What the clock has just passed on its way here is let come: on a slow line all are passed.
+      // Frames that the clock has just passed may still arrive, because on a slow connection all are passed.
       const isLate = held < frame && frame - held <= this.#room.frames && !packed;
       if (wanted.includes(held) || isLate) continue;
       abort.abort();
@@ -174,20 +177,20 @@ export class SequencePlayer implements Timeline {
     }
   }
 
-  /** True of a frame that has not come, until it is asked for again. */
+  /** Whether a frame has failed, until it is requested again. */
   #isMissing(frame: number): boolean {
     return this.#failures.isPaused(this.#fileOf(frame));
   }
 
-  /** Path of what a frame needs: those of one file of motion come, or are missing, together. */
+  /** Path of the file of a frame: the frames of one file of motion arrive, or fail, together. */
   #fileOf(frame: number): string {
     return movedFrame(this.#sequence, frame)?.path ?? framePath(this.#sequence, frame);
   }
 
-  /** A frame cannot be had: that is told once, and it is asked for ever more rarely, then no more. */
+  /** An unavailable frame is reported once, and requested at increasing intervals, then no more. */
   #fail(frame: number, error: unknown): void {
     this.#slots.delete(frame);
-    // Of the frames of one file that have been waited for the first has said it.
+    // The first waiting frame of a file has reported the failure.
     if (this.#isMissing(frame)) return;
     if (this.#failures.fail(this.#fileOf(frame)) === 1 && !this.#isClosed) this.#options.listeners.onError(error);
   }
@@ -212,7 +215,7 @@ export class SequencePlayer implements Timeline {
       if (slot.abort.signal.aborted) return;
       this.#fail(frame, error);
     }
-    // Whoever waits for it, and for those behind it, asks again.
+    // Frames that wait for the same file request it again.
     if (!slot.abort.signal.aborted) listeners.onInput();
   }
 }
@@ -229,7 +232,7 @@ async function load(
   const sh = request.sh === 'auto' ? precision : request.sh;
   const asked = (path: string): FileRequest => {
     const own = partRequest(path, request, limits?.origins);
-    // What the page has made of an address is not changed.
+    // An address that the page has rewritten is not changed.
     const { href } = new URL(path, request.url);
     const url = frameUrl(href);
     return { ...own, ...(url !== href && { url }), limits };

@@ -1,6 +1,6 @@
-/** What elements have besides once they have a child with `slot="sound"`: as of HTMLMediaElement. */
+/** Additional properties of elements with a child with `slot="sound"`: same as on HTMLMediaElement. */
 export interface SoundProperties {
-  /** Whether the sound is silent. */
+  /** Whether the sound is muted. */
   muted?: boolean;
   /** 0..1 */
   volume?: number;

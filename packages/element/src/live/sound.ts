@@ -1,4 +1,4 @@
-/** Loaded only where an element has a child with `slot="sound"`. */
+/** Loaded only if an element has a child with `slot="sound"`. */
 import { css } from 'lit';
 import { adoptStyles } from '../styles.js';
 
@@ -21,20 +21,20 @@ const STYLES = css`
   }
 `;
 
-/** Sound that is nearer to the image than this is left alone, seconds. */
+/** Sound within this offset is left unchanged, seconds. */
 const NEAR = 0.015;
-/** Sound that is farther away is sought; in between it runs a little faster or slower. */
+/** Sound beyond this offset is sought; in between its speed is adjusted. */
 const FAR = 0.12;
-/** How much of that it makes up for in a second. */
+/** Factor of the offset that is corrected per second. */
 const GAIN = 2;
-/** Share of the speed that this takes at most: not heard as another pitch, since browsers keep it. */
+/** Maximum relative change of the speed: inaudible as a change of pitch, which browsers preserve. */
 const MOST_BEND = 0.1;
-/** Without a frame for so long nobody sees the image move, ms: the sound rests. */
+/** Time without a frame after which the sound pauses, ms, because the image does not move. */
 const STILL_MS = 1_000;
-/** Speeds at which browsers play sound. */
+/** Range of playback rates that browsers support. */
 const [SLOWEST, FASTEST] = [0.0625, 16];
 
-/** The element, as far as its sound has to know it. */
+/** The element's interface for its sound. */
 export interface SoundHost extends HTMLElement {
   readonly currentTime: number;
   readonly playbackRate: number;
@@ -43,16 +43,16 @@ export interface SoundHost extends HTMLElement {
   readonly readyState: number;
 }
 
-/** Keeps an `<audio>` or `<video>` of the page in step with a scene that moves, and shows its captions. */
+/** Synchronizes an `<audio>` or `<video>` of the page with an animated scene, and shows its captions. */
 export class Sound {
   readonly #element: SoundHost;
   readonly #captions: HTMLElement;
   #track: HTMLMediaElement | undefined;
   #listening: AbortController | undefined;
   #isRunning = false;
-  /** Time of the scene at which they were compared last. */
+  /** Time of the scene at the last comparison. */
   #alignedTo = NaN;
-  /** The browser waits for a person. */
+  /** Whether the browser waits for a user activation. */
   #isRefused = false;
   #still: ReturnType<typeof setTimeout> | undefined;
 
@@ -69,7 +69,7 @@ export class Sound {
     });
   }
 
-  /** The child may be another one. */
+  /** Call when the child may have changed. */
   update(): void {
     const child = this.#element.querySelector<HTMLMediaElement>(':scope > :is(audio, video)[slot=sound]') ?? undefined;
     if (child === this.#track) return;
@@ -116,7 +116,7 @@ export class Sound {
     this.#captions.lang = language ?? '';
   }
 
-  /** Whether the scene moves forwards, with what it shows at hand, at a speed that sound has. */
+  /** Whether the scene plays forwards, with its frames available, at a rate that sound supports. */
   get #moves(): boolean {
     const { paused, seeking, playbackRate, readyState } = this.#element;
     const hasSpeed = playbackRate >= SLOWEST && playbackRate <= FASTEST;
@@ -130,7 +130,7 @@ export class Sound {
     requestAnimationFrame(this.#step);
   }
 
-  /** Once a frame while the scene plays. */
+  /** Runs once in each frame while the scene plays. */
   readonly #step = (frameTime: number): void => {
     const track = this.#track;
     if (!this.#isRunning || !track) return;
@@ -138,7 +138,7 @@ export class Sound {
     clearTimeout(this.#still);
     this.#still = setTimeout(() => this.#track?.pause(), STILL_MS);
     requestAnimationFrame(this.#step);
-    // By then the clock of the scene has gone on to this frame, whoever was called first.
+    // Deferred, so that the clock of the scene has advanced to this frame in any order of callbacks.
     setTimeout(() => this.#isRunning && track === this.#track && this.#align(track, frameTime));
   };
 
@@ -159,7 +159,7 @@ export class Sound {
     if (track.paused) this.#start(track);
   }
 
-  /** Before a person has done something on the page, browsers allow no sound: it begins then. */
+  /** Browsers allow no sound before a user activation: it starts then. */
   #start(track: HTMLMediaElement): void {
     if (this.#isRefused) return;
     track.play().catch(({ name }: DOMException) => {
@@ -179,7 +179,7 @@ export class Sound {
     if (!track) return;
     track.pause();
     const { currentTime } = this.#element;
-    // Captions are those of the image that stands.
+    // Captions are those of the paused frame.
     if (track.readyState > 0 && Math.abs(track.currentTime - currentTime) > NEAR)
       track.currentTime = Math.min(currentTime, track.duration || currentTime);
   }

@@ -1,11 +1,11 @@
 /** Values that attributes write as text and properties hold as numbers: poses and controls. */
 
-/** Numbers in any shape that authors write them: a number, a list, lists of lists, a typed array, or any of these as text. */
+/** Numbers in any format of authors: a number, a list, nested lists, a typed array, or any of these as text. */
 export type Numbers = string | number | ArrayLike<number> | readonly (ArrayLike<number> | number)[];
 
 /**
- * The numbers, flattened. Text is JSON or numbers with spaces or commas between them.
- * @returns undefined for nothing, and for what holds anything but finite numbers.
+ * The flattened numbers. Text is JSON or numbers separated by spaces or commas.
+ * @returns Undefined for no value, and for anything but finite numbers.
  */
 export function readNumbers(value: Numbers | null | undefined): number[] | undefined {
   if (value === null || value === undefined || value === '') return undefined;
@@ -36,24 +36,24 @@ function flatten(value: unknown): number[] {
 /** Prefix of the attributes that hold controls: `control-smile="0.5"`. */
 export const CONTROL_PREFIX = 'control-';
 
-/** An image for a model: its URL, or what holds its pixels. */
+/** An image for a model: its URL, or an image source. */
 export type ImageSource = string | Blob | GPUCopyExternalImageSource;
 
-/** Of an input that takes several, a list, or addresses with spaces between them. */
+/** For an input of several images, a list, or addresses separated by spaces. */
 export type ImageSources = ImageSource | readonly ImageSource[];
 
-/** Controls as a page gives them, by the names of the model's inputs: numbers, and images for inputs that take some. */
+/** Controls of a page by the names of the model's inputs: numbers, or images for image inputs. */
 export type ControlValues = Readonly<Record<string, Numbers | ImageSources>>;
 
-/** Controls, sorted by what they hold. */
+/** Controls, sorted by type. */
 export interface ReadControls {
   readonly controls: Readonly<Record<string, readonly number[]>>;
   readonly pictures: Readonly<Record<string, ImageSources>>;
 }
 
 /**
- * The controls of an element: its attributes, and above them its property. What holds no numbers may be a picture; whether the model takes
- * one there is known once it is loaded. Empty ones are told to `warn`.
+ * Reads the controls of an element: its attributes, overridden by its property. Values other than numbers may be
+ * images, which is known once the model is loaded. Empty ones are reported to `warn`.
  */
 export function readControls(
   attributes: Iterable<{ readonly name: string; readonly value: string }>,

@@ -6,18 +6,18 @@ import type { OpenOptions } from '../gpu/open-scene.js';
 import type { LiveRequest, Timeline } from './live-model.js';
 import type { LivePictures } from './live-pictures.js';
 
-/** Where a scene without splats is shown meanwhile. */
+/** Destination of a scene without splats meanwhile. */
 export type WaitingPlace = Pick<OpenOptions, 'device' | 'onPreview' | 'submissions'>;
 
-/** Between two looks at the inputs of an element that draws nothing, ms. */
+/** Polling interval for the inputs of an element that draws nothing, ms. */
 const LOOK_MS = 250;
 
-/** Where nothing is known of the subject. */
+/** Bounds of an unknown subject. */
 const UNIT_BALL: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
 
 /**
- * Fulfils once all images that a generator takes have arrived. Meanwhile the element shows a scene without splats, so that the page and the panel of controls
- * know the inputs.
+ * Resolves once all image inputs of a generator have arrived. Meanwhile the element shows a scene without splats, so
+ * that the page and the panel of controls know the inputs.
  * @throws the reason of the signal.
  */
 export async function waitForImages(
@@ -37,7 +37,7 @@ export async function waitForImages(
       clearInterval(timer);
       reject(signal.reason as Error);
     });
-    // Every frame asks; an element out of sight draws none.
+    // Checked in every frame; an off-screen element draws none.
     const timer = place.onPreview ? undefined : setInterval(look, LOOK_MS);
     const waiting: Timeline = { duration: NaN, inputs, settable, request: look, close: () => undefined };
     void showEmpty(place, layout, waiting).then(look, reject);

@@ -1,25 +1,28 @@
-/** Loaded by the worker when the first clip is shown. */
+/** Loaded by the worker for the first clip. */
 import type { ClipIndex, ClipPart } from '@gaussian-splat/formats';
 import { CLIP_HEAD_BYTES, clipIndexBytes, fetchRange, parseClip, readClipPart } from '@gaussian-splat/formats';
 import { packAnimation, type PackedAnimation } from '@gaussian-splat/renderer/tools';
 import { fileName, limitsFrom, named } from './load-scene.js';
 import type { ClipRequest } from './protocol.js';
 
-/** Bytes that are asked for first: the index of most clips, and what follows it. */
+/** Size of the first request: the index of most clips, and some content. */
 const HEAD_BYTES = 8_192;
 
-/** What the beginning of a clip says. */
+/** The parsed beginning of a clip. */
 export interface OpenedClip {
   readonly index: ClipIndex;
-  /** False of servers that send whole files only. */
+  /** False for servers that send whole files only. */
   readonly isPartial: boolean;
 }
 
-/** What a request asks for: the index, or a part. */
+/** Reads the requested data: the index, or a part. */
 export const readClip = (request: ClipRequest, signal: AbortSignal): Promise<OpenedClip | PackedAnimation> =>
   (request.part ? readPart : openClip)(request, signal);
 
-/** Head and index. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted. */
+/**
+ * Reads head and index. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason
+ * once that is aborted.
+ */
 async function openClip(request: ClipRequest, signal: AbortSignal): Promise<OpenedClip> {
   const name = fileName(request.url);
   const limits = limitsFrom(request);
@@ -34,7 +37,7 @@ async function openClip(request: ClipRequest, signal: AbortSignal): Promise<Open
   }
 }
 
-/** A part of a group, as the GPU reads it. Throws as {@link openClip} does. */
+/** Reads a part of a group in the layout of the GPU. Throws as {@link openClip} does. */
 async function readPart(request: ClipRequest, signal: AbortSignal): Promise<PackedAnimation> {
   const { part, frames, origin } = request.part!;
   const name = fileName(request.url);

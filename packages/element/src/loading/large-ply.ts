@@ -1,4 +1,4 @@
-/** Loaded by the worker for large PLYs: their rows are packed by several workers while the rest is on its way. */
+/** Loaded by the worker for large PLYs: several workers pack their rows while the rest is in transit. */
 import { MOST_DROPPED, splatRanges, type LoadLimits } from '@gaussian-splat/formats';
 import { boundsOf } from '@gaussian-splat/core';
 import { packGaussians } from '@gaussian-splat/renderer';
@@ -17,12 +17,12 @@ import { PlyHelpers, type HelperWork } from './ply-helpers.js';
 import { PlyShares, type Rows } from './ply-shares.js';
 import type { LoadedScene, SceneRequest, SentScene } from './protocol.js';
 
-/** Without a helper until then, shares are packed here while bytes arrive, ms. */
+/** Time without a helper after which shards are packed here while bytes arrive, ms. */
 const ALONE_AFTER_MS = 500;
-/** Messages are handled that often while bytes arrive, ms. */
+/** Interval for handling messages while bytes arrive, ms. */
 const TURN_MS = 8;
 
-/** One PLY on its way. */
+/** A PLY that is being downloaded. */
 export class LargePly implements HelperWork {
   readonly #count: number;
   readonly #sh: SceneRequest['sh'];
@@ -33,20 +33,20 @@ export class LargePly implements HelperWork {
   readonly #helpers = new PlyHelpers(this);
   readonly #previews: PartPreviews;
   readonly #began = performance.now();
-  /** When messages were handled last. */
+  /** Time of the last handled messages. */
   #turned = 0;
-  /** Shares below it have been handed out, or packed here. */
+  /** Shards below this index have been assigned, or packed here. */
   #next = 0;
-  /** Tickets that are handed out before others: of helpers that are gone, and of blocks. */
+  /** Tickets to assign first: of lost helpers, and of blocks. */
   readonly #again: number[] = [];
-  /** Cells to be put in order, by their tickets. */
+  /** Cells to be sorted, by their tickets. */
   readonly #blocks = new Map<number, ShareCell>();
   #joined: JoinedBlocks | undefined;
 
   /**
-   * @param beginning of the file
-   * @param total bytes of it
-   * @returns undefined for a file that must be read whole
+   * @param beginning First bytes of the file.
+   * @param total Size of the file in bytes.
+   * @returns Undefined for a file that must be read as a whole.
    */
   static async open(
     beginning: Uint8Array,
@@ -58,7 +58,7 @@ export class LargePly implements HelperWork {
     listeners: LoadListeners,
   ): Promise<LargePly | undefined> {
     const { maxSplats = Infinity } = limits();
-    // What is wrong with a header, or more than the page allows, those say who read it whole. The download keeps the limit of bytes.
+    // Reading the file as a whole reports invalid headers and exceeded limits. The download keeps the limit of bytes.
     const { rows, count = 0 } = (await splatRanges(beginning, name).catch(() => undefined)) ?? {};
     const isWhole =
       rows !== undefined && count > 0 && count <= maxSplats && rows.start + count * rows.byteLength <= total;
@@ -89,9 +89,9 @@ export class LargePly implements HelperWork {
     listeners.askForHelp?.(this.#shares.length, (port) => this.#helpers.add(port));
   }
 
-  /** More of the file is there: all bytes so far. */
+  /** Call with all received bytes when more have arrived. */
   async onArrival(bytes: Uint8Array): Promise<void> {
-    // The download has begun again, perhaps of another file.
+    // The download has restarted, perhaps with another file.
     if (bytes.length < this.#shares.bytes.length) this.#forget(undefined);
     this.#shares.bytes = bytes;
     await this.#shares.findLayout(this.#sh);
@@ -100,14 +100,14 @@ export class LargePly implements HelperWork {
     const request = isAlone ? this.next() : undefined;
     if (request) await this.#workHere(request);
     if (this.#listeners.onPreview) this.#previews.showIfDue();
-    // A download that never has to wait keeps the answers of helpers from this thread.
+    // A download that never waits keeps the answers of helpers from this thread.
     if (this.#helpers.areThere && performance.now() - this.#turned > TURN_MS) {
       await turn();
       this.#turned = performance.now();
     }
   }
 
-  /** The scene, once all bytes are there; undefined if something is wrong with them, which the reader of the whole file can say. */
+  /** Returns the scene, once all bytes are received; undefined for a fault that reading the whole file reports. */
   async finish(bytes: Uint8Array): Promise<LoadedScene | SentScene | undefined> {
     const shares = this.#shares;
     shares.bytes = bytes;
@@ -116,7 +116,7 @@ export class LargePly implements HelperWork {
       await shares.findLayout(this.#sh);
       if (!shares.layout) return undefined;
       await this.#workAll();
-      // The reader of the whole file says that there is no time left, and why too much is dropped.
+      // Reading the file as a whole reports an exceeded time limit, and the reasons of dropped splats.
       if (this.#isLate || !shares.areAllDealt) return undefined;
       const count = shares.splats;
       const droppedCount = this.#count - count;
@@ -127,7 +127,7 @@ export class LargePly implements HelperWork {
         this.#forget(layout);
         continue;
       }
-      // From here on nothing can fail. Without the file a scene takes a third of the memory.
+      // Nothing can fail from here on. Freeing the file reduces the memory of a scene to a third.
       release(bytes);
       const { antialiased = false, filterVariance, origin = [0, 0, 0], up, order, warnings } = shares.facts;
       const { onPart } = this.#listeners;
@@ -165,10 +165,10 @@ export class LargePly implements HelperWork {
     this.#again.push(...tickets);
   }
 
-  /** Has all blocks put in order. */
+  /** Sorts all blocks. */
   async #join(joined: JoinedBlocks): Promise<void> {
     this.#joined = joined;
-    // The largest first: nobody waits for it in the end.
+    // Largest first, so that none delays the end.
     const cells = this.#shares.takeCells().sort((a, b) => b.count - a.count);
     cells.forEach((cell, k) => {
       this.#blocks.set(this.#shares.length + k, cell);
@@ -199,14 +199,14 @@ export class LargePly implements HelperWork {
     else this.take({ ticket, epoch, share: await packRows(request.rows, request.layout) });
   }
 
-  /** Does all work there is, with what helpers there are, and here. */
+  /** Runs all remaining work, on the available helpers and on this thread. */
   async #workAll(): Promise<void> {
     for (;;) {
       this.#signal.throwIfAborted();
       if (this.#isLate && !this.#joined) return;
       this.#helpers.feed();
       const isHelped = this.#helpers.areBusy;
-      // Helpers put blocks in order; this thread has enough to do with what they answer.
+      // Helpers sort blocks; this thread is busy with their answers.
       const request = isHelped && this.#joined ? undefined : this.next();
       if (request) {
         await this.#workHere(request);
@@ -225,7 +225,7 @@ const ofSplats = ({ start, geometry, sh }: SortedBlock): PackedPortion => ({ sta
 
 let own: MessageChannel | undefined;
 
-/** Lets messages that have come be handled. A timer would wait for 4 ms. */
+/** Yields for pending messages. A timer would wait for 4 ms. */
 function turn(): Promise<void> {
   const { port1, port2 } = (own ??= new MessageChannel());
   return new Promise((resolve) => {

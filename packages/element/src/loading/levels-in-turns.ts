@@ -1,12 +1,15 @@
-/** Loaded by the worker when first asked for. */
+/** Loaded by the worker on demand. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { PackedGaussians } from '@gaussian-splat/renderer';
 import { buildPackedLevels, type PackedLevels } from '@gaussian-splat/renderer/tools';
 
-/** Milliseconds after which others have their turn: scenes that are loaded meanwhile, and whoever calls it off. */
+/** Milliseconds after which it yields to other messages: of concurrent loads, and cancellations. */
 const TURN_MS = 30;
 
-/** Builds the levels of detail of a scene; rejects with GaussianSplatError `out-of-memory/allocation`, or the signal's reason. */
+/**
+ * Builds the levels of detail of a scene; rejects with GaussianSplatError `out-of-memory/allocation`, or the signal's
+ * reason.
+ */
 export async function levelsInTurns(packed: PackedGaussians, signal: AbortSignal): Promise<PackedLevels | undefined> {
   try {
     return await build(packed, signal);
@@ -28,7 +31,7 @@ async function build(packed: PackedGaussians, signal: AbortSignal): Promise<Pack
   }
 }
 
-/** Nothing but memory can be missing for levels of a scene that is on show. */
+/** Only memory can be insufficient for levels of a loaded scene. */
 function outOfMemory(cause: unknown): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/allocation', {
     where: 'levels of detail',

@@ -1,14 +1,14 @@
-/** What all loads share: names, progress and errors. */
+/** Common parts of all loads: names, progress and errors. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { outOfMemory } from '@gaussian-splat/formats';
 import type { ProgressListener } from './protocol.js';
 
-/** Milliseconds between two progress reports: chunks may arrive by the thousand. */
+/** Minimum interval of progress reports in ms, because chunks may arrive by the thousand. */
 const PROGRESS_INTERVAL_MS = 50;
 
 /**
- * Last part of the URL's path: what people call the file, and whose extension tells formats without a signature. A `blob:`
- * URL has no name of its own; there the fragment is taken, so that a page can say `${objectUrl}#plant.splat`.
+ * Last segment of the URL's path: the file name for users, whose extension identifies formats without a signature. A
+ * `blob:` URL has no name of its own; its fragment is used, so that a page can append `#plant.splat`.
  */
 export function fileName(url: string): string {
   if (!URL.canParse(url) || url.startsWith('data:')) return url.slice(0, 80);
@@ -25,7 +25,7 @@ function decodeURIComponentSafely(text: string): string {
   }
 }
 
-/** Lets the first and the last report through and few of those between. */
+/** Passes the first and the last report and limits those between. */
 export function throttled(onProgress: ProgressListener): ProgressListener {
   let last = -Infinity;
   return (loaded, total) => {
@@ -36,7 +36,7 @@ export function throttled(onProgress: ProgressListener): ProgressListener {
   };
 }
 
-/** Errors that no reader named: memory that was not to be had, or a fault of ours that the file brought to light. */
+/** Converts errors without a code: failed allocations, or an internal bug that the file triggers. */
 export function named(error: unknown, where: string): GaussianSplatError {
   if (error instanceof GaussianSplatError) return error;
   const memory = outOfMemory(error, where);

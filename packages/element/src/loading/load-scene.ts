@@ -1,4 +1,4 @@
-/** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
+/** Fetches, reads and packs one scene, in the worker, or on the main thread if workers are not available. */
 import { boundsOf, Lazy, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import {
   fetchScene,
@@ -24,33 +24,33 @@ import type {
   SentScene,
 } from './protocol.js';
 
-/** Downloads that are over sooner need no preview. */
+/** Shorter downloads need no preview. */
 const PREVIEW_AFTER_MS = 300;
-/** Without the code of previews a scene comes all the same. */
+/** A scene loads even without the code of previews. */
 const none = (): undefined => undefined;
 
 export { fileName, named, throttled };
 
-/** What a load tells, and whom it asks. */
+/** Listeners of a load. */
 export interface LoadListeners {
   readonly onProgress: ProgressListener;
-  /** Absent: previews are not wanted. */
+  /** Absent: no previews. */
   readonly onPreview?: PreviewListener | undefined;
   /** Takes the splats of a large scene while they are put in order. Absent: they come with the scene. */
   readonly onPart?: PartListener | undefined;
-  /** Called before the thread is kept busy for a while, and while it is; with false when it has more time again. */
+  /** Called before the thread is busy for a while, and during that; with false when it has time again. */
   readonly onReading?: (isReading: boolean) => void;
   /**
-   * Asks for other workers to share the packing with.
-   * @param most so many at most
-   * @param onHelper gets a way to each of them as soon as it is there
+   * Requests other workers for the packing.
+   * @param most Maximum number.
+   * @param onHelper Is called with a port to each of them when it is available.
    */
   readonly askForHelp?: (most: number, onHelper: (port: MessagePort) => void) => void;
 }
 
 /**
- * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
- * reason once that is aborted.
+ * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`,
+ * `out-of-memory/allocation`), or the signal's reason once that is aborted.
  */
 export async function loadScene(
   request: SceneRequest,
@@ -86,7 +86,7 @@ export async function loadScene(
     });
     const shared = askForHelp && new SharedReading(request, name, limits, signal, listeners);
     const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
-      // Of a PLY that is large there are previews of its own.
+      // A large PLY has its own previews.
       if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
       else if (onPreview && performance.now() - start >= PREVIEW_AFTER_MS)
         await (await previews.get().catch(none))?.onArrival(bytes, total);
@@ -99,7 +99,7 @@ export async function loadScene(
       const { parseSequence } = await loadSequenceCode();
       return parseSequence(bytes, name);
     }
-    // Nothing lies beside what has no place.
+    // Blob and data URLs have no sibling files.
     const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, options);
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, {
@@ -126,22 +126,22 @@ export async function loadScene(
 export const loadSequenceCode = (): Promise<typeof sequences> =>
   loadModule('the code that reads sequences', () => import('./sequence-of.js'));
 
-/** The limits of a load that begins now, with the seconds that are left whenever they are asked for. */
+/** The limits of a load that starts now, with the remaining seconds at each call. */
 export function limitsFrom({ limits }: Pick<SceneRequest, 'limits'>): () => LoadLimits {
   const start = performance.now();
   return () => ({ ...limits, maxSeconds: (limits?.maxSeconds ?? Infinity) - (performance.now() - start) / 1000 });
 }
 
-/** What one file may have of that: a scene takes as much again as its file. */
+/** Limits for one file: a scene takes as much again as its file. */
 export const fileLimits = ({ maxBytes = Infinity, maxSeconds }: LoadLimits): LoadLimits => ({
   maxBytes: maxBytes / 2,
   maxSeconds,
 });
 
-/** Bytes of a PLY from which on several workers share its rows. */
+/** Minimum size in bytes of a PLY whose rows several workers share. */
 const LARGE_BYTES = 1 << 25;
 
-/** Finds out whether a file that is on its way is a PLY whose rows several workers can share. */
+/** Determines whether a file in transit is a PLY whose rows several workers can share. */
 class SharedReading {
   readonly #of: readonly [
     name: string,
@@ -151,7 +151,7 @@ class SharedReading {
     listeners: LoadListeners,
   ];
   #isRefused = false;
-  /** Undefined for any other. */
+  /** Undefined for any other file. */
   ply: Promise<LargePly | undefined> | undefined;
 
   constructor(
@@ -164,7 +164,7 @@ class SharedReading {
     this.#of = [name, request, limits, signal, listeners];
   }
 
-  /** True of large PLYs, but for those whose rows must be read in order. */
+  /** Whether it is a large PLY, unless its rows must be read in order. */
   mayBeShared(bytes: Uint8Array, total = 0): boolean {
     return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
   }
@@ -182,7 +182,7 @@ class SharedReading {
   }
 }
 
-/** True where the file that the address names is the smaller part of the scene. */
+/** Whether the named file may be the smaller part of the scene. */
 function mayHaveParts(name: string): boolean {
   return /\.(json|gltf)$/i.test(name);
 }

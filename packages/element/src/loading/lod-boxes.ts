@@ -1,4 +1,4 @@
-/** Loaded by the worker when the first streamed SOG scene is asked for. */
+/** Loaded by the worker for the first streamed SOG scene. */
 import {
   fetchScene,
   LoadBudget,
@@ -15,11 +15,11 @@ import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene
 import { ProgressSum } from './progress-sum.js';
 import type { BoxRequest, ClipAnswer, ClipRequest, LoadedBoxes, ProgressListener, SceneRequest } from './protocol.js';
 
-/** Of all such scenes of the page. */
+/** Cache for all such scenes of the page. */
 const files = new SogFiles();
-/** Scenes whose accounts are kept. */
+/** Maximum number of accounts. */
 const MAX_ACCOUNTS = 64;
-/** What the files of a scene have cost since it was opened, by the address of its index. The page counts their bytes. */
+/** Charges of a scene's files since it was opened, by the address of its index. The page counts their bytes. */
 const accounts = new Map<string, LoadBudget>();
 
 function accountOf(url: string): LoadBudget {
@@ -31,8 +31,8 @@ function accountOf(url: string): LoadBudget {
 }
 
 /**
- * Reads the index of a streamed SOG scene and the coarsest level of each of its boxes. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or
- * the signal's reason once that is aborted.
+ * Reads the index of a streamed SOG scene and the coarsest level of each of its boxes. Throws GaussianSplatError
+ * (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's reason once that is aborted.
  */
 export async function openBoxes(
   request: SceneRequest | ClipRequest,
@@ -66,7 +66,7 @@ export async function openBoxes(
   }
 }
 
-/** As numbers: a message copies the text of a path for each object that has it. */
+/** As numbers, because a message copies the text of a path for each object that has it. */
 function placesOf({ boxes, files }: LodScene): Pick<LoadedBoxes, 'files' | 'runs' | 'firstRuns'> {
   const all = boxes.flatMap(({ runs }) => runs);
   const firstRuns = new Uint32Array(boxes.length);

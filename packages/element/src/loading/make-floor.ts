@@ -1,12 +1,12 @@
-/** The walkable floor of a scene file; loaded by the worker when a page asks for it. */
+/** Finds the walkable floor of a scene file; loaded by the worker on demand. */
 import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { floorOf, makeWalkMap, readVoxels, voxelTreePath, type WalkMap } from '@gaussian-splat/formats/walk';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
 import type { FloorRequest } from './protocol.js';
 
 /**
- * Reads a scene file once more, usually from the browser's cache, and finds its floor. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the
- * signal's reason once that is aborted.
+ * Reads a scene file again, usually from the browser's cache, and finds its floor. Throws GaussianSplatError
+ * (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted.
  */
 export async function makeFloor(request: FloorRequest, signal: AbortSignal): Promise<WalkMap> {
   const { credentials, options, voxelUrl } = request;

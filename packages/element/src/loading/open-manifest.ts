@@ -1,4 +1,4 @@
-/** Loaded by the worker when the first streamed scene is asked for. */
+/** Loaded by the worker for the first streamed scene. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchScene, LoadBudget } from '@gaussian-splat/formats';
 import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
@@ -7,13 +7,14 @@ import type { FileRequest, ProgressListener } from './protocol.js';
 
 export { decodePage } from '@gaussian-splat/renderer/tools';
 
-/** A file takes some 50 bytes, for 5 pages; and the page's thread gets a copy of what they say. */
+/** Maximum size: a file takes about 50 bytes, for 5 pages, and the parsed manifest is copied to the main thread. */
 const MAX_BYTES = 1 << 24;
-/** What a page takes of the page's memory before it is there. */
+/** CPU memory of a page before it is loaded. */
 const PAGE_BYTES = 128;
 
 /**
- * Fetches and checks a `detail.json`. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's reason once that is aborted.
+ * Fetches and validates a `lod.json`. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`),
+ * or the signal's reason once that is aborted.
  */
 export async function openManifest(
   { url, credentials, limits = {} }: FileRequest,

@@ -1,4 +1,4 @@
-/** Loaded by the worker when the first mesh is asked for. */
+/** Loaded by the worker for the first mesh. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { partRequest } from '@gaussian-splat/core/fetch';
 import { fetchScene, LoadBudget, readTriangles, type ImageFile, type TriangleFile } from '@gaussian-splat/formats';
@@ -7,8 +7,8 @@ import { ProgressSum } from './progress-sum.js';
 import type { FileRequest, LoadedMesh, ProgressListener } from './protocol.js';
 
 /**
- * Fetches a glTF and the files that it names, checks what it costs, and decodes its images. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's
- * reason once that is aborted.
+ * Fetches a glTF and the files that it names, checks its costs, and decodes its images. Throws GaussianSplatError
+ * (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted.
  */
 export async function openMeshFile(
   request: FileRequest,
@@ -55,7 +55,7 @@ async function withBitmaps(file: TriangleFile, name: string, signal: AbortSignal
   return { ...file, images: bitmaps };
 }
 
-/** As `GLTFLoader` decodes them: the values of the file, without a color profile. */
+/** Same as `GLTFLoader`: the values of the file, without a color profile. */
 async function decoded({ bytes, type, width, height }: ImageFile, where: string): Promise<ImageBitmap> {
   const fail = (found: string, cause?: unknown): never => {
     throw new GaussianSplatError('decode/corrupt', {

@@ -1,13 +1,19 @@
-/** Loaded by the worker when the first generator is asked for: headers of models are strangers' files, too. */
+/** Loaded by the worker for the first generator, because headers of models are untrusted, too. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { openHeader, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core/onnx';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
 import type { ModelRequest } from './protocol.js';
 
-/** Nodes, tensors and values of a graph that the page's thread gets at most: it looks at each of them. Real ones have thousands. */
+/**
+ * Maximum number of nodes, tensors and values of a graph, because the main thread processes each of them. Real ones
+ * have thousands.
+ */
 const MOST_PARTS = 200_000;
 
-/** Reads the header of a model. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted. */
+/**
+ * Reads the header of a model. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's
+ * reason once that is aborted.
+ */
 export async function openModel({ place, limits }: ModelRequest, signal: AbortSignal): Promise<OpenedModel> {
   const name = 'url' in place ? fileName(place.url) : place.name;
   const { maxBytes = Infinity, maxSeconds = Infinity } = fileLimits(limitsFrom({ limits })());

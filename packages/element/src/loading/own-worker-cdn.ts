@@ -1,6 +1,9 @@
 import { spawnAt } from './spawn-worker.js';
 
-/** The CDN build in place of own-worker.ts: the worker's script lies beside the element's, and finds its readers beside itself. */
+/**
+ * Replaces own-worker.ts in the CDN build: the worker's script is in the folder of the element's, and loads its readers
+ * from there.
+ */
 export const OWN_WORKERS: readonly (() => Worker)[] = [
   (): Worker => spawnAt(new URL('./scene-worker.js', import.meta.url)),
 ];

@@ -2,9 +2,10 @@ import { spawnText } from './spawn-worker.js';
 import { BOOTSTRAP, type CodeAnswer, type CodeQuestion } from './worker-bootstrap.js';
 
 /**
- * How the package starts its worker, in the order in which it is tried. First as text: the build has made the worker's code and each reader a
- * string in a module of its own. Bundlers treat workers each in their own way; such modules they split and serve as any that is imported lazily.
- * Where a Content-Security-Policy has no `blob:`, it is the file that those bundlers emit which know this expression; it has all readers in it.
+ * Ways to start the worker of the package, in order. First as text: the build converts the worker's code and each
+ * reader to strings in separate modules. Bundlers differ in handling workers, but all split and serve lazily imported
+ * modules. If a Content-Security-Policy excludes `blob:`, the second way is a file with all readers, which bundlers
+ * that know this expression emit.
  */
 export const OWN_WORKERS: readonly (() => Worker)[] = [
   spawnOfText,
@@ -20,13 +21,13 @@ function spawnOfText(): Worker {
   return worker;
 }
 
-/** Sends the texts that a chunk of the worker's code needs and that have not been sent, its own last. */
+/** Sends the missing texts for a chunk of the worker's code, its own last. */
 async function answer({ id, chunk }: CodeQuestion, port: MessagePort, sent: Set<string>): Promise<void> {
   try {
     const { CHUNKS } = await import('./worker-code.js');
     const names = [...CHUNKS[chunk].needs, chunk].filter((name) => !sent.has(name));
     const modules = await Promise.all(names.map((name) => CHUNKS[name].load()));
-    // Others may have been asked for meanwhile: they build on what is sent here, and before them.
+    // Other chunks may have been requested meanwhile: they depend on the texts sent here.
     for (const name of names) sent.add(name);
     port.postMessage({ id, texts: modules.map(({ default: text }) => text) } satisfies CodeAnswer);
   } catch (error) {

@@ -1,4 +1,4 @@
-/** Loaded only for files that bring levels of detail. */
+/** Loaded only for files with their own levels of detail. */
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import { packLevelRuns } from '@gaussian-splat/renderer/tools';
 import type { LoadedScene, SceneRequest } from './protocol.js';

@@ -1,4 +1,4 @@
-/** Loaded by workers that read and pack shares of a large PLY, and put its blocks in order. */
+/** Loaded by workers that read and pack shards of a large PLY, and sort its blocks. */
 import { readPrefix, samplePreview } from '@gaussian-splat/formats';
 import {
   layoutOf,
@@ -15,32 +15,32 @@ import { buffersOf } from './protocol.js';
 
 /** Rows of a PLY. */
 export interface ShareRows {
-  /** A PLY: the file's header, and these rows alone. */
+  /** A PLY with the file's header, and only these rows. */
   readonly bytes: Uint8Array<ArrayBuffer>;
-  /** Of the file. */
+  /** Name of the file. */
   readonly name: string;
 }
 
-/** The number of a piece of work, and which beginning of all work it belongs to. */
+/** Number of a task, and the epoch of the whole work. */
 interface Ticket {
   readonly ticket: number;
   readonly epoch: number;
 }
 
-/** Rows to be packed, or a block to be put in order. */
+/** Rows to pack, or a block to sort. */
 export type HelperRequest = Ticket &
   ({ readonly rows: ShareRows; readonly layout: ShareLayout } | { readonly block: ShareBlock });
 
 export interface HelperAnswer extends Ticket {
-  /** The memory of the request, for another one: memory that is new costs more time than what is written to it. */
+  /** The memory of the request, for reuse, because allocating costs more time than writing. */
   readonly room?: ArrayBuffer;
   readonly share?: ReadShare;
   readonly block?: SortedBlock;
 }
 
-/** Rows that have been read. */
+/** Result of reading rows. */
 export interface ReadShare {
-  /** Undefined if none of the rows can be drawn, or they could not be read. */
+  /** Undefined if no row is usable, or they could not be read. */
   readonly packed?: PackedShare | undefined;
   /** Some of the splats. */
   readonly preview?: GaussianCloud | undefined;
@@ -48,20 +48,20 @@ export interface ReadShare {
   readonly antialiased?: boolean;
   readonly order?: 'pixel' | undefined;
   readonly filterVariance?: number | undefined;
-  /** What the file says points up. */
+  /** Up direction that the file declares. */
   readonly up?: Vector3 | undefined;
   readonly origin?: Vector3;
-  /** What of the file is not drawn. */
+  /** Messages about content that is not drawn. */
   readonly warnings?: readonly string[] | undefined;
 }
 
-/** The layout of a scene by some of its rows. Undefined if they hold no splat. */
+/** The layout of a scene from some of its rows. Undefined if they hold no splat. */
 export async function layoutBy({ bytes, name }: ShareRows, precision: ShPrecision): Promise<ShareLayout | undefined> {
   const cloud = await readPrefix(bytes, { name });
   return cloud && layoutOf(cloud, precision);
 }
 
-/** Reads and packs some rows. Never throws for what is in them. */
+/** Reads and packs some rows. Never throws for invalid content. */
 export async function packRows({ bytes, name }: ShareRows, layout: ShareLayout): Promise<ReadShare> {
   const cloud = await readPrefix(bytes, { name });
   if (cloud === undefined) return {};
@@ -76,12 +76,15 @@ export async function packRows({ bytes, name }: ShareRows, layout: ShareLayout):
   return share;
 }
 
-/** Gives memory back at once. Browsers count such buffers late: without it those of many shares lie side by side. Older ones cannot do it. */
+/**
+ * Frees memory at once. Garbage collection of such buffers is late, so that those of many shards would accumulate.
+ * Older browsers do not support it.
+ */
 export function release(...arrays: ArrayBufferView[]): void {
   for (const { buffer } of arrays) (buffer as { transfer?: (bytes: number) => unknown }).transfer?.(0);
 }
 
-/** Does the work that comes through a port until the worker is ended. */
+/** Runs the tasks from a port until the worker is terminated. */
 export function packShares(port: MessagePort): void {
   const answer = (answer: HelperAnswer): void => {
     const { share, block, room } = answer;
@@ -92,7 +95,7 @@ export function packShares(port: MessagePort): void {
     const { ticket, epoch } = data;
     const room = ('block' in data ? data.block.words : data.rows.bytes).buffer;
     if ('block' in data) return answer({ ticket, epoch, room, block: sortBlock(data.block) });
-    // The thread that waits for the answer does the work again if none comes.
+    // If no answer arrives, the waiting thread runs the task again.
     packRows(data.rows, data.layout).then(
       (share) => answer({ ticket, epoch, room, share }),
       () => answer({ ticket, epoch, room, share: {} }),

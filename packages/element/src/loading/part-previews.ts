@@ -1,15 +1,15 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
-/** Downloads that are over sooner need no preview. */
+/** Shorter downloads need no preview. */
 const FIRST_AFTER_MS = 300;
-/** Each preview shows this many times as many shares as the one before. */
+/** Ratio of the shards in consecutive previews. */
 const GROWTH = 2;
-/** Splats of a preview at most: it must be there at once. */
+/** Maximum number of splats in a preview, which must be ready at once. */
 const MOST_SPLATS = 50_000;
-/** Previews may take this share of the time since the load began. */
+/** Maximum fraction of the time since the start of the load for previews. */
 const MAX_SHARE = 0.05;
 
-/** Previews of a scene of which some shares have been read: some of their splats, larger to stand for the rest. */
+/** Previews of a scene from some of its shards: some of their splats, enlarged to represent the rest. */
 export class PartPreviews {
   readonly #show: (cloud: GaussianCloud) => void;
   readonly #parts: (GaussianCloud | undefined)[];
@@ -18,7 +18,7 @@ export class PartPreviews {
   #there = 0;
   #due = 1;
 
-  /** @param shares of the scene. @param show packs and posts a preview */
+  /** @param shares Number of shards in the scene. @param show Packs and posts a preview. */
   constructor(shares: number, show: (cloud: GaussianCloud) => void) {
     this.#show = show;
     this.#parts = new Array<undefined>(shares);
@@ -45,7 +45,7 @@ export class PartPreviews {
   }
 }
 
-/** One cloud of several, with no more than {@link MOST_SPLATS}: every so many-th, larger. */
+/** Merges several clouds, reduced to {@link MOST_SPLATS}: every n-th splat, enlarged. */
 function thinned(parts: readonly GaussianCloud[]): GaussianCloud {
   const all = parts.reduce((sum, { count }) => sum + count, 0);
   const step = Math.ceil(all / MOST_SPLATS);

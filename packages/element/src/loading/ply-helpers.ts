@@ -1,32 +1,32 @@
-/** Workers that pack shares of a large PLY and put blocks in order, beside the one that reads it. */
+/** Workers that pack shards of a large PLY and sort blocks, in addition to the one that reads it. */
 import type { HelperAnswer, HelperRequest } from './pack-shares.js';
 import { buffersOf } from './protocol.js';
 
-/** Requests that a helper has at the same time: the next is there when one is done. */
+/** Requests of a helper in progress, so that the next one is queued when one is done. */
 const AT_ONCE = 3;
-/** A helper that has answered nothing for so long is not waited for any more, ms. */
+/** Time without an answer after which a helper is not awaited any more, ms. */
 const TIMEOUT_MS = 5_000;
 
 interface Helper {
   readonly port: MessagePort;
-  /** Tickets that it was given and has not answered. */
+  /** Unanswered tickets. */
   readonly open: Set<number>;
 }
 
-/** Where the work of helpers comes from, and where it goes. */
+/** Source and destination of the helpers' work. */
 export interface HelperWork {
   next(): HelperRequest | undefined;
   take(answer: HelperAnswer): void;
-  /** Was given to a helper that is gone. */
+  /** Called with the tickets of a lost helper. */
   giveBack(tickets: Iterable<number>): void;
 }
 
 export class PlyHelpers {
   readonly #work: HelperWork;
   readonly #helpers: Helper[] = [];
-  /** Memory that helpers have given back. */
+  /** Memory that helpers have returned. */
   readonly rooms: ArrayBuffer[] = [];
-  /** Counts the beginnings of the work: answers to requests of before are ignored. */
+  /** Epoch of the work: answers to earlier requests are ignored. */
   #epoch = 0;
   #wake: () => void = () => undefined;
 
@@ -60,7 +60,7 @@ export class PlyHelpers {
     this.feed();
   }
 
-  /** Gives them what there is. */
+  /** Assigns available work. */
   feed(): void {
     for (let round = 0; round < AT_ONCE; round++)
       for (const { port, open } of this.#helpers) {
@@ -72,13 +72,13 @@ export class PlyHelpers {
       }
   }
 
-  /** The work begins anew. */
+  /** Restarts the work. */
   forget(): void {
     this.#epoch++;
     for (const { open } of this.#helpers) open.clear();
   }
 
-  /** Waits for the next answer, and gives up those from whom none comes. */
+  /** Waits for the next answer, and abandons helpers without any. */
   async answerSoon(): Promise<void> {
     let timer: ReturnType<typeof setTimeout> | undefined;
     const isSilent = await new Promise<boolean>((resolve) => {

@@ -1,4 +1,4 @@
-/** The rows of a large PLY in shares that can be packed apart, and what has been read of them. */
+/** The rows of a large PLY in shards that can be packed independently, and the results. */
 import type { SplatRanges } from '@gaussian-splat/formats';
 import { SHARE_SPLATS, ShareCells, type ShareCell, type ShareLayout } from '@gaussian-splat/renderer/tools';
 import { layoutBy, type ReadShare, type ShareRows } from './pack-shares.js';
@@ -6,24 +6,24 @@ import type { SceneRequest } from './protocol.js';
 
 export type Rows = NonNullable<SplatRanges['rows']>;
 
-/** A share that has been read. Its splats lie in their cells. */
+/** A read shard. Its splats are in their cells. */
 type Share = ReadShare & { readonly count: number };
 
 export class PlyShares {
   readonly #name: string;
   readonly #rows: Rows;
   readonly #count: number;
-  /** Those that have been read, in the order of the file; a cell takes those that follow one another. */
+  /** Read shards, in the order of the file; a cell contains consecutive ones. */
   readonly #shares: (Share | undefined)[];
   readonly #waiting = new Map<number, ReadShare>();
-  /** Of the file, as far as it has come. */
+  /** Received part of the file. */
   bytes: Uint8Array = new Uint8Array();
   #layout: ShareLayout | undefined;
   #cells: ShareCells | undefined;
-  /** Shares below it lie in their cells. */
+  /** Shards below this index are in their cells. */
   #dealt = 0;
 
-  /** @param count splats of the file */
+  /** @param count Number of splats in the file. */
   constructor(name: string, rows: Rows, count: number) {
     this.#name = name;
     this.#rows = rows;
@@ -35,7 +35,7 @@ export class PlyShares {
     return this.#shares.length;
   }
 
-  /** Shares of which all bytes are there. */
+  /** Number of completely received shards. */
   get arrived(): number {
     const { start, byteLength } = this.#rows;
     const rows = Math.floor((this.bytes.length - start) / byteLength);
@@ -46,12 +46,12 @@ export class PlyShares {
     return this.#dealt === this.length;
   }
 
-  /** Splats that can be drawn, of the shares that have been read. */
+  /** Usable splats of the shards that have been read. */
   get splats(): number {
     return this.#shares.reduce((sum, share) => sum + (share?.count ?? 0), 0);
   }
 
-  /** What the shares say of the whole scene. */
+  /** Properties of the whole scene from its shards. */
   get facts(): Partial<Share> {
     return this.#shares.find((share) => share?.shDegree !== undefined) ?? {};
   }
@@ -60,19 +60,19 @@ export class PlyShares {
     return this.#layout;
   }
 
-  /** The layout that the splats of all shares ask for. */
+  /** The layout for the splats of all shards. */
   layoutFor(sh: SceneRequest['sh']): ShareLayout {
     return this.#cells!.layoutFor(sh);
   }
 
-  /** Hands the cells over, once all shares are dealt. */
+  /** Returns the cells, once all shards are distributed. */
   takeCells(): ShareCell[] {
     const cells = this.#cells!.all();
     this.#cells = undefined;
     return cells;
   }
 
-  /** By the first share that has splats. */
+  /** Derives it from the first shard that has splats. */
   async findLayout(sh: SceneRequest['sh']): Promise<void> {
     if (this.#layout || this.arrived === 0) return;
     const precision = sh === 'auto' ? 'int8' : sh;
@@ -100,8 +100,8 @@ export class PlyShares {
   }
 
   /**
-   * The file's header and the rows of a share: a PLY that has not come whole yet.
-   * @param room memory for them, where it is large enough
+   * The file's header and the rows of a shard: a PLY without its end.
+   * @param room Memory for them, if it is large enough.
    */
   rowsOf(share: number, room?: ArrayBuffer): ShareRows {
     const { start, byteLength } = this.#rows;

@@ -1,12 +1,12 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { readPrefix } from '@gaussian-splat/formats';
 
-/** A preview may take this share of the time since the load began: previews must not make loading slow. */
+/** Maximum fraction of the time since the start of the load for previews, so that they do not slow loading. */
 const MAX_SHARE = 0.2;
-/** Each preview of a download shows this many times as many bytes as the one before. */
+/** Ratio of the bytes in consecutive previews of a download. */
 const GROWTH = 1.6;
 
-/** Loaded for scenes that take their time. Decides when a part of a scene that is still arriving is shown. */
+/** Loaded for slow scenes. Decides when a part of a scene that is still arriving is shown. */
 export class PreviewSchedule {
   readonly #name: string;
   readonly #signal: AbortSignal;
@@ -19,9 +19,9 @@ export class PreviewSchedule {
   #shown = 0;
 
   /**
-   * @param start when the load began, ms
-   * @param show packs and posts a preview
-   * @param onReading called before and after it is read
+   * @param start Start of the load, ms.
+   * @param show Packs and posts a preview.
+   * @param onReading Called before and after it is read.
    */
   constructor(
     name: string,
@@ -37,7 +37,7 @@ export class PreviewSchedule {
     this.#show = show;
   }
 
-  /** For `fetchScene`: shows what has arrived, now and then. */
+  /** For `fetchScene`: shows the received part at intervals. */
   readonly onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
     const elapsed = performance.now() - this.#start;
     const isDue = bytes.length >= this.#nextBytes && bytes.length !== total;
@@ -54,7 +54,7 @@ export class PreviewSchedule {
     this.#nextBytes = GROWTH * bytes.length;
   };
 
-  /** For `readScene`: shows a selection of the splats, unless more of them are on show. */
+  /** For `readScene`: shows a selection of the splats, unless more of them are shown already. */
   readonly onPreview = (cloud: GaussianCloud): void => {
     if (cloud.count > this.#shown) this.#show(cloud);
   };

@@ -4,16 +4,16 @@ import type { ProgressListener } from './protocol.js';
 export class ProgressSum {
   readonly #onProgress: ProgressListener;
   readonly #files: { loaded: number; total: number | undefined }[] = [];
-  /** Files that there are at least: until then the total is not known. */
+  /** Minimum number of files: until then the total is unknown. */
   readonly #least: number;
 
-  /** @param hasParts true if the first file names others, whose lengths count. */
+  /** @param hasParts Whether the first file names others, whose lengths count. */
   constructor(onProgress: ProgressListener, hasParts: boolean) {
     this.#onProgress = onProgress;
     this.#least = hasParts ? 2 : 1;
   }
 
-  /** Begins another file; returns what its download calls. */
+  /** Adds another file; returns the listener of its download. */
   add(): ProgressListener {
     const file = { loaded: 0, total: undefined as number | undefined };
     this.#files.push(file);

@@ -1,4 +1,4 @@
-/** What the page and the scene worker say to each other. */
+/** Messages between the page and the scene worker. */
 import type { ErrorData, Vector3 } from '@gaussian-splat/core';
 import type { ModelPlace } from '@gaussian-splat/core/onnx';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
@@ -16,29 +16,32 @@ import type {
   ShPrecision,
 } from '@gaussian-splat/renderer/tools';
 
-/** A scene file, and the body that walks in it. */
+/** A scene file, and the dimensions of a walker. */
 export interface FloorRequest extends FileRequest {
-  /** Absolute address of a `.voxel.json`, which the floor is found in, in place of the splats. */
+  /** Absolute address of a `.voxel.json`, the source of the floor instead of the splats. */
   readonly voxelUrl?: string | undefined;
   readonly options: FloorOptions;
 }
 
 /** A file to fetch. */
 export interface FileRequest {
-  /** Absolute URL: a worker's own base URL is not the page's. */
+  /** Absolute URL, because a worker's own base URL differs from the page's. */
   readonly url: string;
-  /** What is there, for a worker that could not fetch it. */
+  /** Its content, for a worker that could not fetch it. */
   readonly file?: Blob | undefined;
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;
-  /** What a file of pages that is coded is decoded by. */
+  /** Parameters for decoding a coded file of pages. */
   readonly coded?: CodedFile | undefined;
 }
 
-/** What loads of a page may cost, and which servers they may ask: see `GaussianSplatElement.sceneLimits`. */
+/** Limits of a page's loads, and allowed servers: see `GaussianSplatElement.sceneLimits`. */
 export interface SceneLimits extends LoadLimits {
-  /** Origins of other servers that manifests may name files on, such as `https://cdn.example`; they get no cookies. Default: none but the manifest's own. */
+  /**
+   * Origins of other servers that manifests may refer to, such as `https://cdn.example`; they get no cookies. Default:
+   * only the manifest's own.
+   */
   readonly origins?: readonly string[];
 }
 
@@ -52,28 +55,28 @@ export interface ModelRequest {
 export interface SceneRequest extends FileRequest {
   /** Precision of the spherical harmonics on the GPU. */
   readonly sh: ShPrecision | 'auto';
-  /** Whether levels of detail are wanted that the file has, besides the finest. */
+  /** Whether the file's own levels of detail are needed, besides the finest. */
   readonly levels?: boolean;
-  /** What is to draw it; without it, WebGPU. */
+  /** Its backend; default WebGPU. */
   readonly renderer?: RendererChoice;
-  /** Whether a streamed SOG scene is loaded whole, in its finest level. */
+  /** Whether a streamed SOG scene is loaded completely, in its finest level. */
   readonly isWhole?: boolean;
-  /** Bytes of GPU memory that a streamed scene may take where it is not drawn page by page: as much of it is loaded as fits. */
+  /** GPU memory limit in bytes of a streamed scene that is drawn without pages: as much of it is loaded as fits. */
   readonly streamBytes?: number;
-  /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
+  /** The contract of a generator, if the page provides one: an address, JSON text, or the object. */
   readonly contract?: unknown;
-  /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */
+  /** Absolute URLs of models that each receive the Gaussians of the previous one, the first those of `url`. */
   readonly chain?: readonly string[];
 }
 
-/** A scene that has been fetched, but for its splats. */
+/** A fetched scene without its splats. */
 export interface LoadedFacts {
   readonly bounds: SceneBounds;
-  /** What of the file is not drawn: see `GaussianCloud.warnings`. */
+  /** Messages about content that is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
-  /** What splats are ordered by, where the file tells: see `CloudHints.order`. */
+  /** Sort order of splats, if the file declares one: see `CloudHints.order`. */
   readonly order?: 'pixel' | undefined;
-  /** The file has triangles, too. */
+  /** Whether the file has triangles, too. */
   readonly hasMeshes?: boolean | undefined;
 }
 
@@ -87,64 +90,70 @@ export interface SentScene extends LoadedFacts {
   readonly packed?: undefined;
 }
 
-/** Of a scene that is uploaded while its splats are put in order: the head comes first, and again if the load begins again. */
+/** Part of a scene that is uploaded while its splats are sorted: the head comes first, and again if the load restarts. */
 export type ScenePart = { readonly head: PackedHead } | { readonly portion: PackedPortion };
 
 /** Called with each part. The last one holds the bounds of all chunks. */
 export type PartListener = (part: ScenePart) => void;
 
-/** The triangles of a file, checked, with its images decoded. */
+/** The triangles of a file, validated, with its images decoded. */
 export interface LoadedMesh extends Omit<TriangleFile, 'images'> {
-  /** Each image that is used. */
+  /** Each used image. */
   readonly images: readonly (ImageBitmap | undefined)[];
 }
 
-/** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */
+/** The manifest of a sequence of scenes, instead of a scene. Its paths are relative to its own address. */
 export type LoadedSequence = SceneSequence;
 
-/** A frame of a sequence whose splats are those of the first: all that the worker must know, for it may have been ended meanwhile. */
+/**
+ * A frame of a sequence with the splats of the first: all data that the worker needs, because it may have been
+ * restarted meanwhile.
+ */
 export interface MovedFrameRequest {
   readonly first: FileRequest;
-  /** The file with what this frame differs by, its number there, and the frames of the file; absent for the first frame. */
+  /**
+   * The file with the differences of this frame, its index there, and the frames of the file; absent for the first
+   * frame.
+   */
   readonly motion?: (FileRequest & { readonly frame: number; readonly frames: number }) | undefined;
   readonly sh: SceneRequest['sh'];
   readonly limits?: SceneLimits | undefined;
 }
 
-/** The index of a clip, or a part of one of its groups: asked for as `boxes`, since both come by byte ranges. */
+/** The index of a clip, or a part of one of its groups: requested as `boxes`, because both use byte ranges. */
 export interface ClipRequest extends FileRequest {
   readonly isClip: true;
-  /** The whole file, where the page has it. */
+  /** The whole file, if the page has it. */
   readonly whole?: Blob | undefined;
   /** Absent for the index. */
   readonly part?: { readonly part: ClipPart; readonly frames: number; readonly origin: Vector3 };
 }
 
-/** What comes of a {@link ClipRequest}. */
+/** Result of a {@link ClipRequest}. */
 export interface ClipAnswer<T> {
   readonly clip: T;
-  /** Its buffers change threads. */
+  /** Its buffers are transferred. */
   readonly levels: object;
 }
 
-/** A streamed SOG scene of which the coarsest levels are there. */
+/** A streamed SOG scene with its coarsest levels. */
 export interface LoadedBoxes {
   readonly levels: LevelScene;
   /** Paths of the SOG files, relative to the index. */
   readonly files: readonly string[];
-  /** The levels of all boxes, those of a box the coarsest first: number of the file, first splat, and count of each. */
+  /** The levels of all boxes, coarsest first within a box: index of the file, first splat, and count of each. */
   readonly runs: Float64Array;
-  /** Number of the first run of each box. */
+  /** Index of the first run of each box. */
   readonly firstRuns: Uint32Array;
 }
 
-/** A level of a box of such a scene: all that the worker must know, for it may have been ended meanwhile. */
+/** A level of a box of such a scene: all data that the worker needs, because it may have been restarted meanwhile. */
 export interface BoxRequest {
   /** Absolute address of the index. */
   readonly url: string;
   /** Path of the SOG file, relative to the index. */
   readonly path: string;
-  /** First splat there. */
+  /** Index of its first splat in the file. */
   readonly first: number;
   readonly count: number;
   readonly page: LevelPage;
@@ -154,18 +163,18 @@ export interface BoxRequest {
 }
 
 /**
- * Called with a part of a scene that is still loading, ready for upload: fewer splats, or splats without their view-dependent colours.
- * Each preview replaces the one before.
+ * Called with a part of a scene that is still loading, ready for upload: fewer splats, or splats without their
+ * view-dependent colors. Each preview replaces the previous one.
  */
 export type PreviewListener = (preview: LoadedScene) => void;
 
 /**
- * Hears how many bytes have arrived, and of how many; undefined while that is not known.
- * @param share of all that there is to do, 0..1; absent where that is the bytes alone.
+ * Called with the received and total bytes; the total is undefined if unknown.
+ * @param share Fraction of the whole work, 0..1; absent if the bytes determine it.
  */
 export type ProgressListener = (loaded: number, total: number | undefined, share?: number) => void;
 
-/** What a worker may be asked for; every request gets a number, and one `answer` or `error`. */
+/** Requests to a worker; every request has a number, and one `answer` or `error`. */
 export type WorkerRequest =
   | {
       readonly type: 'load';
@@ -186,31 +195,31 @@ export type WorkerRequest =
 export type PageMessage =
   | (WorkerRequest & { readonly id: number })
   | { readonly type: 'cancel'; readonly id: number }
-  /** Is answered by `pong`. */
+  /** Answered by `pong`. */
   | { readonly type: 'ping' }
-  /** A way to another worker that packs splats. */
+  /** A port to another worker that packs splats. */
   | { readonly type: 'helper'; readonly id: number; readonly port: MessagePort }
-  /** Pack what comes through the port. */
+  /** Packs the data from the port. */
   | { readonly type: 'pack'; readonly port: MessagePort }
-  /** Sort splats, at these positions, for the views that come through the port. */
+  /** Sorts splats at these positions for the views from the port. */
   | {
       readonly type: 'sort';
       readonly port: MessagePort;
       readonly positions: Float32Array;
       readonly areas?: Float32Array | undefined;
     }
-  /** Run a generator once on the CPU, in a worker that is started for it. */
+  /** Runs a generator once on the CPU, in a worker that is started for it. */
   | CpuRunMessage;
 
 export type WorkerMessage =
-  /** The script runs. */
+  /** The script has started. */
   | { readonly type: 'ready' }
   | { readonly type: 'pong' }
-  /** From now on it reads for a request, and may not answer for long. */
+  /** It starts reading for a request, and may not answer for long. */
   | { readonly type: 'reading'; readonly id: number }
-  /** It has read for a request, or nothing is done for it any more. */
+  /** It has finished reading for a request, or the request was canceled. */
   | { readonly type: 'rested'; readonly id: number }
-  /** Other workers could share the packing for a request: so many at most. */
+  /** Other workers could share the packing for a request: at most this many. */
   | { readonly type: 'help'; readonly id: number; readonly most: number }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
@@ -218,7 +227,7 @@ export type WorkerMessage =
   | { readonly type: 'answer'; readonly id: number; readonly answer: unknown }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };
 
-/** Every buffer of some plain objects once: transferred, data of any size changes threads at no cost. */
+/** All buffers of some plain objects, each once: they are transferred between threads without copies. */
 export function buffersOf(...parts: readonly object[]): ArrayBuffer[] {
   const buffers = parts
     .flatMap((part) => Object.values(part))

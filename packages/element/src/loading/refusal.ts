@@ -1,6 +1,6 @@
-/** Loaded only where no worker starts. */
+/** Loaded only if no worker starts. */
 
-/** Warns, once for a page, that scenes are read on its own thread: why, and what to do. */
+/** Warns, once for a page, that scenes are read on the main thread, with the reason and a remedy. */
 export function warnOfRefusal(reason: string, violated: string | undefined, location: string | null): void {
   const directive = violated ?? /Content-Security-Policy: (\S+)/.exec(reason)?.[1];
   const cause = directive ? `the page's Content-Security-Policy forbids it: ${directive}` : reason;

@@ -1,9 +1,9 @@
-/** What a contract that was given as an object says, so that it is written down once however often it is compared. */
+/** Serialized contracts by object, so that repeated comparisons serialize each once. */
 const written = new WeakMap<object, unknown>();
 
 /**
- * Whether two contracts, as the property `contract` takes them, say the same. Frameworks make a new object of the same content for every render:
- * that must not load a generator anew.
+ * Whether two values of the property `contract` have equal content. Frameworks create a new object of the same content
+ * for every render, which must not reload a generator.
  */
 export function isSameContract(a: unknown, b: unknown): boolean {
   return a === b || contentOf(a) === contentOf(b);
@@ -15,7 +15,7 @@ function contentOf(contract: unknown): unknown {
   return written.get(contract);
 }
 
-/** JSON, or the object itself where it has none: what is wrong with it will be said when it is read. */
+/** JSON, or the object itself if it cannot be serialized: its faults are reported when it is read. */
 function write(contract: object): unknown {
   try {
     return JSON.stringify(contract);

@@ -19,19 +19,22 @@ import { WorkerPool } from './worker-pool.js';
 /** The worker's code. */
 export type Here = typeof workerModule;
 
-/** Loads scenes in workers: one for the whole page, started on the first load and ended when idle, and more only where that one does not answer. */
+/**
+ * Loads scenes in workers: one for the whole page, started on the first load and ended when idle, and more only if that
+ * one does not respond.
+ */
 export class SceneLoader {
-  /** Starts a worker that is the caller's own. */
+  /** Starts a worker for the caller. */
   readonly spawn: () => Worker;
   readonly #pool: WorkerPool;
-  /** Which of {@link OWN_WORKERS} is taken. */
+  /** Index of the current way of {@link WORKER_SOURCES}. */
   #way = 0;
-  /** The directive of the page's policy that has forbidden a worker. */
+  /** The directive of the page's policy that has blocked a worker. */
   #violated: string | undefined;
 
   /**
-   * @param spawn starts a worker; tests pass their own
-   * @param locationOf address of the worker's script; null for the element's own
+   * @param spawn Starts a worker; tests pass their own.
+   * @param locationOf Address of the worker's script; null for the element's own.
    */
   constructor(spawn?: () => Worker, locationOf: () => string | null = () => null) {
     this.spawn = spawn ?? (() => this.#spawnAt(locationOf()));
@@ -65,7 +68,7 @@ export class SceneLoader {
    * Fetches, reads and packs a scene. Rejects with GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or
    * with the signal's reason as soon as that is aborted.
    *
-   * @param onPreview called with what can be shown of a large scene before it is whole; never after the promise has settled.
+   * @param onPreview Called with previews of a large scene before it is complete; never after the promise has settled.
    */
   async load(
     request: SceneRequest,
@@ -79,8 +82,8 @@ export class SceneLoader {
   }
 
   /**
-   * The same for an address that may name a sequence: then its manifest is what comes.
-   * @param onPart takes the splats of a large scene, which then come before it: see {@link SentScene}.
+   * The same for an address that may name a sequence: the result is then its manifest.
+   * @param onPart receives the splats of a large scene, before the result: see {@link SentScene}.
    */
   open(
     request: SceneRequest,
@@ -110,14 +113,17 @@ export class SceneLoader {
     );
   }
 
-  /** The bytes of one file. Rejects with GaussianSplatError `network/*`, `out-of-memory/allocation`, or with the signal's reason as soon as that is aborted. */
+  /**
+   * Fetches the bytes of one file. Rejects with GaussianSplatError `network/*`, `out-of-memory/allocation`, or with the
+   * signal's reason as soon as that is aborted.
+   */
   fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
     return this.ask({ type: 'file', request }, signal, ({ fetchFile }) => fetchFile(request, signal));
   }
 
   /**
-   * Has a worker do what it knows: see `WorkerRequest`. Rejects as {@link load} does.
-   * @param here does it on the page's own thread, where workers are refused
+   * Sends a request to a worker: see `WorkerRequest`. Rejects as {@link load} does.
+   * @param here Runs it on the main thread, if workers are not available.
    */
   ask<T>(
     request: WorkerRequest,
@@ -135,7 +141,7 @@ export class SceneLoader {
     try {
       return await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
     } catch (error) {
-      // Where it cannot be had here, either, it was no policy of the page that kept the worker away.
+      // If the code cannot be loaded here either, the page's policy was not the cause.
       this.#way = 0;
       this.#pool.retry();
       throw error;
@@ -143,7 +149,10 @@ export class SceneLoader {
   }
 }
 
-/** Workers do not know `blob:` addresses of pages without an origin, from a disk or in a sandboxed frame: they get the file itself. */
+/**
+ * Workers cannot read `blob:` addresses of pages without an origin, from a disk or in a sandboxed frame: they get the
+ * file itself.
+ */
 async function withFile<T extends { readonly request: FileRequest }>(asked: T): Promise<T> {
   const { url } = asked.request;
   if (!url.startsWith('blob:')) return asked;

@@ -1,6 +1,6 @@
 /**
- * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
- * {@link loadScene} and the others itself; then nothing here listens.
+ * The module worker that loads scenes. If a page does not allow workers it imports this same module and calls {@link
+ * loadScene} and the others itself; then nothing here listens.
  */
 import { loadModule } from '@gaussian-splat/core';
 import type { OpenedModel } from '@gaussian-splat/core/onnx';
@@ -31,7 +31,8 @@ import type { WalkMap } from '@gaussian-splat/formats/walk';
 export { loadScene };
 
 /**
- * The bytes of one file, in a buffer of their own, or the words of coded pages. Throws GaussianSplatError (`network/*`, `decode/*`), or the signal's reason once that is aborted.
+ * The bytes of one file, in a buffer of their own, or the words of coded pages. Throws GaussianSplatError (`network/*`,
+ * `decode/*`), or the signal's reason once that is aborted.
  */
 export async function fetchFile(
   { url, credentials, limits, coded }: FileRequest,
@@ -40,7 +41,7 @@ export async function fetchFile(
   const { maxBytes, maxSeconds } = limits ?? {};
   const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, maxBytes, maxSeconds });
   if (coded === undefined) return bytes.slice().buffer;
-  // What read the manifest is there already.
+  // The code that read the manifest is loaded already.
   const { decodePage } = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
   return decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
 }
@@ -96,19 +97,19 @@ const transferablesOf = ({ views, images }: LoadedMesh): Transferable[] => [
   ...images.flatMap((image) => image ?? []),
 ];
 
-/** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
+/** The used part of a worker's global scope, which TypeScript's DOM types lack. */
 interface WorkerScope {
   postMessage(message: WorkerMessage, transfer?: Transferable[]): void;
   addEventListener(type: 'message', listener: (event: MessageEvent<PageMessage>) => void): void;
 }
 
-/** What came of a request, and its buffers, which change threads. */
+/** Result of a request, and its buffers, which are transferred. */
 type Answer = readonly [answer: unknown, transfer?: Transferable[]];
 
-/** What is done for one request. */
+/** State of one request. */
 interface Work {
   readonly abort: AbortController;
-  /** Gets the ways to other workers, one after the other. */
+  /** Called with the ports to other workers, one after the other. */
   onHelper?: (port: MessagePort) => void;
 }
 
@@ -150,14 +151,14 @@ function serve(scope: WorkerScope): void {
     return [levels, levels ? buffersOf(levels, levels.coarser) : []];
   }
 
-  /** Of streamed scenes: the reading of a response costs its thread more than all else that a page of it does. */
+  /** For streamed scenes: reading a response costs its thread more than all other work for a page. */
   const whole = async (bytes: Promise<ArrayBuffer>): Promise<Answer> => [await bytes, [await bytes]];
 
   async function answerTo(id: number, work: Work, message: WorkerRequest): Promise<Answer> {
     const { signal } = work.abort;
     if (message.type === 'load') return load(id, work, message);
     if (message.type === 'file') return whole(fetchFile(message.request, signal));
-    // From here on the readers are at work.
+    // From here on the readers are busy.
     scope.postMessage({ type: 'reading', id });
     if (message.type === 'levels') return buildLevels(message, signal);
     if (message.type === 'box') return whole(readBox(message.request, signal));
@@ -182,14 +183,14 @@ function serve(scope: WorkerScope): void {
     return [opened, buffersOf(opened, opened.levels)];
   }
 
-  /** Does what a message asks for, and answers: with an error, too, that nobody has named. For what was called off nobody waits. */
+  /** Runs a request, and answers, also with errors without a code. No answer is needed for canceled ones. */
   async function run(id: number, message: WorkerRequest): Promise<void> {
     const work: Work = { abort: new AbortController() };
     const { signal } = work.abort;
     running.set(id, work);
     try {
       const asked = 'request' in message && 'file' in message.request ? message.request : undefined;
-      // The name of the file is behind the address.
+      // The name of the file is appended to the address.
       if (asked?.file) Object.assign(asked, { url: URL.createObjectURL(asked.file) + new URL(asked.url).hash });
       const [answer, transfer] = await answerTo(id, work, message);
       if (!signal.aborted) scope.postMessage({ type: 'answer', id, answer }, transfer);
@@ -215,7 +216,10 @@ function serve(scope: WorkerScope): void {
   scope.postMessage({ type: 'ready' });
 }
 
-/** In a worker that does one thing: without its code the owner gets an `error` event, which a rejection does not make. */
+/**
+ * In a worker with a single purpose: a failure to load its code must raise an `error` event, which a rejection does
+ * not.
+ */
 function serveWith<T>(code: Promise<T>, serve: (code: T) => unknown): void {
   code.then(serve, (error: unknown) =>
     setTimeout(() => {

@@ -1,4 +1,4 @@
-/** Loaded only for sequences: for the manifest of one, and for frames that are told by what they differ by from the first. */
+/** Loaded only for sequences: for the manifest of one, and for frames that are stored as differences from the first. */
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
@@ -19,22 +19,22 @@ import type { FileRequest, LoadedScene, MovedFrameRequest, ProgressListener } fr
 
 export { parseSequence } from '@gaussian-splat/formats';
 
-/** The first frame of a sequence, and how many bytes it arrived as. */
+/** The first frame of a sequence, and its downloaded bytes. */
 interface First {
   readonly cloud: GaussianCloud;
   readonly bounds: SceneBounds;
   readonly arrived: number;
 }
 
-/** Of all sequences of the page. */
+/** Caches of all sequences of the page. */
 const firsts = new SharedReads<First>(({ cloud }) => 4 * cloud.count * (11 + cloud.sh.length / cloud.count));
 const motions = new SharedReads<Motion & { arrived: number }>(({ splats, parts }) =>
   Object.values(parts).reduce((sum, { codes }) => sum + 2 * splats * codes.length, 0),
 );
 
 /**
- * Reads and packs a frame. Files that several frames need are read once. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that
- * is aborted.
+ * Reads and packs a frame. Files that several frames need are read once. Throws GaussianSplatError (`network/*`,
+ * `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted.
  */
 export async function readMovedFrame(
   { first, motion, sh, limits }: MovedFrameRequest,

@@ -3,19 +3,19 @@ import { SplatOrder, type OrderView } from '@gaussian-splat/renderer/webgl';
 
 export interface SortRequest {
   readonly view: OrderView;
-  /** What is written into, and comes back. */
+  /** Buffer for the result, which is transferred back. */
   readonly order: Uint32Array<ArrayBuffer>;
 }
 
 export interface SortAnswer extends SortRequest {
   readonly count: number;
-  /** How often the splats cover the image. */
+  /** Total coverage of the image by the splats. */
   readonly covered: number;
-  /** What sorting took, ms. */
+  /** Duration of sorting, ms. */
   readonly milliseconds: number;
 }
 
-/** Answers what comes through a port. @param positions [N, 3] @param areas [N] */
+/** Answers the requests from a port. @param positions [N, 3] @param areas [N] */
 export function sortSplats(port: MessagePort, positions: Float32Array, areas: Float32Array | undefined): void {
   const splats = new SplatOrder(positions, areas);
   port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {

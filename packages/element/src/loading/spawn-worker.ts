@@ -1,6 +1,6 @@
 /**
- * A worker whose script lies at an address. A worker script must have the page's origin; where it lies elsewhere (a CDN), or the page has no
- * origin as in a sandboxed frame, a one-line script of the page's own imports it.
+ * Starts a worker from the address of its script. A worker script must have the page's origin; if it has another (a
+ * CDN), or the page has no origin as in a sandboxed frame, a one-line script of the page's own imports it.
  */
 export function spawnAt(script: URL): Worker {
   if (script.origin !== globalThis.origin) return spawnFromElsewhere(script);
@@ -12,22 +12,22 @@ function spawnFromElsewhere(script: URL): Worker {
 }
 
 /**
- * A worker whose script is the text of a promise of what serves it. Messages that come before wait for it, and what fails is thrown where the
- * worker's owner hears of it.
+ * Starts a worker from the text of a promise of its message handler. Earlier messages are queued, and errors are thrown
+ * so that the worker's owner receives them.
  */
 export function spawnText(code: string): Worker {
   const text = `const early=[],keep=(e)=>early.push(e);addEventListener('message',keep);${code}.then(()=>{removeEventListener('message',keep);for(const e of early)dispatchEvent(new MessageEvent('message',{data:e.data,ports:[...e.ports]}))}).catch((e)=>setTimeout(()=>{throw e}))`;
-  // No module: sandboxed frames start none of a blob.
+  // Not a module, because sandboxed frames start no module worker from a blob.
   const url = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
   const worker = new Worker(trustedUrl(url));
-  // The URL is only needed until the script has been fetched, which its first message or its failure tells.
+  // The URL is needed only until the script has been fetched, as its first message or its failure shows.
   const revoke = (): void => URL.revokeObjectURL(url);
   worker.addEventListener('message', revoke, { once: true });
   worker.addEventListener('error', revoke, { once: true });
   return worker;
 }
 
-/** Trusted Types, which TypeScript's types of the page do not know yet. */
+/** Trusted Types, which TypeScript's DOM types lack. */
 interface TrustedTypes {
   createPolicy(
     name: string,
@@ -37,7 +37,10 @@ interface TrustedTypes {
 
 let policy: ReturnType<TrustedTypes['createPolicy']> | null | undefined;
 
-/** An address that pages with `require-trusted-types-for 'script'` accept; as it is where there is no such thing, or the page refuses the policy. */
+/**
+ * Converts an address for pages with `require-trusted-types-for 'script'`; unchanged if that is not supported, or the
+ * page rejects the policy.
+ */
 function trustedUrl(url: string): string {
   const { trustedTypes } = globalThis as { trustedTypes?: TrustedTypes };
   if (policy === undefined) policy = trustedTypes ? createPolicy(trustedTypes) : null;
@@ -46,7 +49,7 @@ function trustedUrl(url: string): string {
 
 function createPolicy(trustedTypes: TrustedTypes): ReturnType<TrustedTypes['createPolicy']> | null {
   try {
-    // Only addresses that are made in this file come here.
+    // Only addresses that are created in this file are passed here.
     return trustedTypes.createPolicy('gaussian-splat', { createScriptURL: (url) => url });
   } catch {
     return null;

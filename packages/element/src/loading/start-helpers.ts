@@ -1,16 +1,16 @@
 /** Loaded only for scenes that several workers pack. */
 import type { PageMessage, WorkerMessage } from './protocol.js';
 
-/** Threads that are left alone: the page's own, and that of the worker that is helped. */
+/** Threads that are not used: the main thread, and that of the worker that is helped. */
 const OTHERS = 2;
-/** Workers that help at most. More would wait for the one that hands out the shares. */
+/** Maximum number of helpers. More would wait for the worker that distributes the shards. */
 const MOST_HELPERS = 7;
 
 /**
- * Starts workers that pack shares of a scene for another one.
- * @param id the load that they help with
- * @param most so many of them at most
- * @returns ends them
+ * Starts workers that pack shards of a scene for another one.
+ * @param id The load that they help with.
+ * @param most Maximum number of them.
+ * @returns A function that ends them.
  */
 export function startHelpers(worker: Worker, id: number, most: number, spawn: () => Worker): () => void {
   const { hardwareConcurrency = 2 } = navigator;
@@ -27,7 +27,7 @@ export function startHelpers(worker: Worker, id: number, most: number, spawn: ()
       },
       { once: true },
     );
-    // One that does not come, or ends, is missed by nobody: what it was to do is done by the others.
+    // The others take over the work of one that fails to start, or ends.
     helper.addEventListener('error', (event) => event.preventDefault());
     return helper;
   });

@@ -1,4 +1,7 @@
-/** Loaded by the worker for streamed scenes that are drawn without pages: as much of them as fits is read, the coarsest first. */
+/**
+ * Loaded by the worker for streamed scenes that are drawn without pages: as much of them as fits is read, coarsest
+ * first.
+ */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { partRequest } from '@gaussian-splat/core/fetch';
 import { fetchScene, openPartAt, readScene, type FetchSceneOptions, type LoadLimits } from '@gaussian-splat/formats';
@@ -16,23 +19,23 @@ import type { LoadListeners } from './load-scene.js';
 import { openManifest } from './open-manifest.js';
 import type { LoadedScene, SceneRequest } from './protocol.js';
 
-/** Bytes that a splat takes with harmonics of degree 3 in 8 bits, and for frames: see `glBytes`. */
+/** Bytes of a splat with harmonics of degree 3 in 8 bits, including frame data: see `glBytes`. */
 const SPLAT_BYTES = 4 * (8 + 14 + 9);
-/** A preview is shown when there are so many times as many pages as in the one before. */
+/** Ratio of the pages in consecutive previews. */
 const GROWTH = 8;
 
-/** What the loading of a scene has at hand. */
+/** Environment of a scene's load. */
 export interface StreamLoad extends Pick<LoadListeners, 'onProgress' | 'onPreview' | 'onReading'> {
   readonly name: string;
   readonly limits: () => LoadLimits;
-  /** Of each file. */
+  /** Options of each download. */
   readonly options: () => FetchSceneOptions;
   readonly pack: (cloud: GaussianCloud) => LoadedScene;
 }
 
 /**
- * Loads the finest part of a `lod-meta.json` or `detail.json` that fits. Throws as `loadScene` does.
- * @param memory bytes that it may take on the GPU
+ * Loads the finest part of a `lod-meta.json` or `lod.json` that fits. Throws as `loadScene` does.
+ * @param memory Upper limit of its GPU memory in bytes.
  */
 export async function loadWholeStream(
   request: SceneRequest,
@@ -60,7 +63,7 @@ async function loadSog(
   return pack(cloud);
 }
 
-/** Reads pages from the roots down until there is no room for the next one. */
+/** Reads pages from the roots down until the next one does not fit. */
 async function loadPages(
   request: SceneRequest,
   mostSplats: number,
@@ -98,7 +101,7 @@ async function loadPages(
   return { ...pack(cloudOf(manifest, list, pages, words)), order: manifest.order };
 }
 
-/** The words of a file, as the GPU of a streamed scene reads them. */
+/** The words of a file, in the layout of the GPU for streamed scenes. */
 async function wordsOf(
   where: string,
   bytes: Uint8Array,
@@ -119,7 +122,7 @@ async function wordsOf(
   });
 }
 
-/** The chunks of some pages that no other of them is the detail of. */
+/** The chunks of some pages that are not refined by others of them. */
 function cloudOf(
   manifest: DetailManifest,
   list: InstanceList,

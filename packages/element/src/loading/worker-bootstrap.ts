@@ -1,16 +1,18 @@
-/** What a worker made of text asks the page for: a chunk of its code. */
+/** Request of a text worker to the page: a chunk of its code. */
 export interface CodeQuestion {
   readonly id: number;
   readonly chunk: string;
 }
 
-/** The texts of that chunk and of all that it needs and the worker does not have yet; or why they cannot be had. */
+/** The texts of that chunk and of its missing dependencies; or the reason of a failure. */
 export type CodeAnswer =
   { readonly id: number; readonly texts: readonly string[] } | { readonly id: number; readonly failure: string };
 
 /**
- * The script of a worker made of text, for `spawnText`: a promise of its main chunk. The first message brings the port for its code. Each text is `"name":(exports,require,gaussianSplatChunk)=>{…}`. They are run one after the
- * other, and an answer without texts waits, too: the second of two that were asked for at the same time may need what came with the first, or be the same. It is written as text itself, since bundlers change functions.
+ * The script of a text worker, for `spawnText`: a promise of its main chunk. The first message contains the port for
+ * its code. Each text is `"name":(exports,require,gaussianSplatChunk)=>{…}`. They run in sequence, and an answer
+ * without texts waits, too: the second of two concurrent requests may need the texts of the first, or be the same. It
+ * is written as text itself, because bundlers change functions.
  */
 export const BOOTSTRAP = `new Promise((start)=>addEventListener('message',({ports})=>{
 early.length=0;

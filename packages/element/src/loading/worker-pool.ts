@@ -2,38 +2,38 @@ import { GaussianSplatError, Lazy } from '@gaussian-splat/core';
 import type { WorkerMessage, WorkerRequest } from './protocol.js';
 import { WorkerSlot, type Job } from './worker-slot.js';
 
-/** An unused worker is kept this long: pages with several elements load one scene after another. */
+/** How long an unused worker is kept, because pages with several elements load one scene after another. */
 const IDLE_MS = 5_000;
-/** And one that has fetched for a streamed scene this long: its camera may move again at any time. */
+/** The same for one that has fetched for a streamed scene, whose camera may move again at any time. */
 const STREAMING_IDLE_MS = 60_000;
-/** How often a worker that has something to do is asked for a sign of life, ms. */
+/** Interval of pings to a busy worker, ms. */
 const TICK_MS = 100;
-/** Questions in a row without an answer after which a worker gets nothing new. */
+/** Number of missed pings after which a worker gets no new requests. */
 const BUSY = 2;
-/** And after which what else waits in it begins again elsewhere, and a worker whose load was called off is ended. */
+/** Number after which its other requests restart in another worker, and a worker with a canceled load is terminated. */
 const SILENT = 5;
-/** And after which it counts as dead, whatever it was said to read: browsers do not tell. */
+/** Number after which it counts as dead, even while reading, because browsers do not report that. */
 const DEAD = 600;
-/** A script that takes longer is loaded without the worker, ms. */
+/** Time limit of the start of a worker, ms; after it the load runs without the worker. */
 const START_MS = 2_000;
 const RESTART_MS = 15_000;
-/** How long it is waited for once more when all that is needed without it is there, ms. */
+/** Additional time for the worker when everything for running without it is loaded, ms. */
 const GRACE_MS = 500;
-/** Workers of a page at most. Scenes of strangers that never end hold one each; what comes after them waits. */
+/** Maximum number of workers of a page. Untrusted scenes that never finish occupy one each; later loads wait. */
 const MOST_WORKERS = 8;
-/** How often a load may begin again: it may have been next to several that never answer. */
+/** Maximum number of restarts of a load, which may have been in a worker with several that never finish. */
 const MOST_MOVES = 3;
-/** So often counts a death while it was read: once more, and no more. */
+/** Restart count of a load after a worker died while reading it: one more attempt. */
 const AFTER_DEATH = 2;
 
 const help = new Lazy('the code that starts workers', () => import('./start-helpers.js'));
 
-/** Why work is done on the page's thread. */
+/** Reports the reason that work runs on the main thread. */
 export type Refusal = (reason: string) => void;
 
 /**
- * The workers of a page. One serves all loads while it answers. Where it does not, because it is reading a large or a hostile scene or has died, what else
- * waits in it begins again in another; work that was called off and does not stop is ended with its worker.
+ * The workers of a page. One serves all loads while it responds. If it does not, because it reads a large or a hostile
+ * scene or has died, its other loads restart in another one; canceled work that does not stop is ended with its worker.
  */
 export class WorkerPool {
   readonly #spawn: () => Worker;
@@ -44,15 +44,15 @@ export class WorkerPool {
   readonly #queue: Job[] = [];
   #isRefused = false;
   #hasWarned = false;
-  /** The script has come once: where it does not come at once now, the machine is busy. */
+  /** Whether the script has loaded once: if it does not load at once later, the machine is busy. */
   #hasStarted = false;
   #nextId = 0;
   #clock: ReturnType<typeof setInterval> | undefined;
 
   /**
-   * @param prepare fetches what work on the page's own thread needs
-   * @param onRefused called once where work is done there
-   * @param another makes `spawn` start its workers in another way, after one has failed; false where there is none
+   * @param prepare Loads the code for work on the main thread.
+   * @param onRefused Called once if work runs there.
+   * @param another Switches `spawn` to another way to start workers after a failure; false if there is none.
    */
   constructor(
     spawn: () => Worker,
@@ -66,14 +66,15 @@ export class WorkerPool {
     this.#another = another;
   }
 
-  /** The next request asks for a worker again. */
+  /** Lets the next request try a worker again. */
   retry(): void {
     this.#isRefused = false;
   }
 
   /**
-   * Has a request answered by a worker. Rejects with GaussianSplatError, or with the signal's reason as soon as that is aborted.
-   * @param here does the work on the page's own thread, where workers are refused
+   * Sends a request to a worker. Rejects with GaussianSplatError, or with the signal's reason as soon as that is
+   * aborted.
+   * @param here Runs it on the main thread, if workers are not available.
    */
   async run<T>(
     request: WorkerRequest,
@@ -99,7 +100,7 @@ export class WorkerPool {
     }
   }
 
-  /** Gives a request to a worker that answers, or to a new one. */
+  /** Assigns a request to a responsive worker, or to a new one. */
   #place(job: Job): void {
     if (this.#isRefused) return job.resolve(job.here());
     const slots = [...this.#slots];
@@ -107,7 +108,7 @@ export class WorkerPool {
     if (late) return void this.#doWithout(late, job);
     const free = slots.find((slot) => slot.missed < BUSY && slot.mayTake(job));
     const slot = free ?? (slots.length < MOST_WORKERS ? this.#start() : undefined);
-    // A worker that cannot even be made has said so.
+    // The creation of a worker has failed and reported it.
     if (this.#isRefused) return job.resolve(job.here());
     if (!slot) return void this.#queue.push(job);
     slot.take(job);
@@ -118,7 +119,7 @@ export class WorkerPool {
     this.#clock ??= setInterval(this.#tick, TICK_MS);
   }
 
-  /** Answered, failed or called off. */
+  /** The request was answered, failed or was canceled. */
   #remove(job: Job): void {
     const { slot } = job;
     const at = this.#queue.indexOf(job);
@@ -133,7 +134,7 @@ export class WorkerPool {
     for (const job of this.#queue.splice(0)) this.#place(job);
   }
 
-  /** With nothing to do for so long the worker ends. */
+  /** An idle worker ends after this time. */
   #rest(slot: WorkerSlot, idleMs: number): void {
     if (slot.jobs.size === 0) slot.rest(idleMs, () => this.#end(slot));
   }
@@ -179,13 +180,13 @@ export class WorkerPool {
     else if (job) this.#help(slot, job.id, message.most).catch(() => undefined);
   }
 
-  /** Other workers for one that packs a large scene: they end with what they help with. Without their code it packs alone. */
+  /** Starts helpers for a worker that packs a large scene: they end with that load. Without their code it packs alone. */
   async #help(slot: WorkerSlot, id: number, most: number): Promise<void> {
     const { startHelpers } = await help.get();
     if (slot.jobs.has(id)) slot.helpers.set(id, startHelpers(slot.worker, id, most, this.#spawn));
   }
 
-  /** The page may have no workers. */
+  /** The page may not allow workers. */
   #fail(slot: WorkerSlot, reason: string): void {
     const jobs = [...slot.jobs.values()];
     this.#end(slot);
@@ -199,7 +200,7 @@ export class WorkerPool {
     this.#placeQueued();
   }
 
-  /** The worker's script does not come. It may yet. */
+  /** The worker's script does not load in time, but may later. */
   #late(slot: WorkerSlot): void {
     slot.isLate = true;
     for (const job of slot.jobs.values()) {
@@ -209,7 +210,7 @@ export class WorkerPool {
     this.#placeQueued();
   }
 
-  /** The code may come for both: then the worker is a little later. */
+  /** The code may load for both: then the worker is only a little later. */
   async #doWithout(slot: WorkerSlot, job: Job): Promise<void> {
     job.slot = undefined;
     try {
@@ -241,7 +242,10 @@ export class WorkerPool {
     this.#clock = undefined;
   };
 
-  /** What waits in a worker that does not answer begins again elsewhere. Without a load of its own it reads what nobody wants, or is dead. */
+  /**
+   * Requests in an unresponsive worker restart in others. Without a load of its own it reads a canceled one, or is
+   * dead.
+   */
   #relieve(slot: WorkerSlot): void {
     const isDead = slot.missed >= DEAD;
     const reader = isDead ? undefined : slot.reader;
@@ -252,16 +256,19 @@ export class WorkerPool {
     this.#placeQueued();
   }
 
-  /** A load begins again, alone in a worker: it may be what has kept the other one busy. */
+  /** A load restarts alone in a worker, because it may have kept the other one busy. */
   #move(slot: WorkerSlot, job: Job, moves: number, found = 'a worker that gave no sign of life'): void {
     slot.drop(job);
     job.moves += moves;
-    // What was given away cannot be given again.
+    // Transferred buffers cannot be sent again.
     if (job.transfer || job.moves > MOST_MOVES) return job.reject(stopped(found));
     this.#place(job);
   }
 
-  /** A worker that dies after it had started was most likely denied memory: by what it read, or by its only load. The others begin again. */
+  /**
+   * A worker that dies after its start most likely ran out of memory: in its current read, or in its only load. The
+   * others restart.
+   */
   #crash(slot: WorkerSlot, message: string): void {
     const jobs = [...slot.jobs.values()];
     const guilty = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);

@@ -1,34 +1,34 @@
 import type { PageMessage, PartListener, PreviewListener, ProgressListener, WorkerRequest } from './protocol.js';
 
-/** What a worker is asked for. */
+/** A request to a worker. */
 export interface Job {
   readonly id: number;
   readonly request: WorkerRequest;
   readonly onProgress?: ProgressListener | undefined;
   readonly onPreview?: PreviewListener | undefined;
   readonly onPart?: PartListener | undefined;
-  /** Buffers that go with the request, which can then be sent only once. */
+  /** Buffers of the request, which can then be sent only once. */
   readonly transfer?: Transferable[] | undefined;
-  /** Does the work on the page's own thread. */
+  /** Runs the request on the main thread. */
   readonly here: () => Promise<unknown>;
   readonly resolve: (answer: unknown) => void;
   readonly reject: (reason: unknown) => void;
-  /** How often it has begun again. */
+  /** Number of restarts. */
   moves: number;
   slot?: WorkerSlot | undefined;
 }
 
-/** A worker, and what it was asked for. */
+/** A worker, and its requests. */
 export class WorkerSlot {
   readonly worker: Worker;
   readonly jobs = new Map<number, Job>();
-  /** Ends the workers that help with a job. */
+  /** Functions that end the helpers of a job. */
   readonly helpers = new Map<number, () => void>();
   isReady = false;
   isLate = false;
-  /** Questions in a row without an answer. */
+  /** Number of missed pings. */
   missed = 0;
-  /** What it has last said to read: that alone keeps it from answering. */
+  /** The request that it is reading, which alone keeps it from responding. */
   reading: number | undefined;
   startTimer: ReturnType<typeof setTimeout> | undefined;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
@@ -37,17 +37,20 @@ export class WorkerSlot {
     this.worker = worker;
   }
 
-  /** Whether it is worth asking for a sign of life. */
+  /** Whether pings are useful. */
   get isAsked(): boolean {
     return this.isReady && (this.jobs.size > 0 || this.reading !== undefined);
   }
 
-  /** The job that it reads, unless that was called off. */
+  /** The job that it reads, unless that was canceled. */
   get reader(): Job | undefined {
     return this.reading === undefined ? undefined : this.jobs.get(this.reading);
   }
 
-  /** What cannot begin again, or has once, shares its worker with nothing else; nor is one given more that reads what nobody wants. */
+  /**
+   * A job that cannot restart, or has restarted, does not share its worker; nor does a worker that reads a canceled job
+   * get another.
+   */
   mayTake(job: Job): boolean {
     const jobs = [...this.jobs.values()];
     const isLeft = this.reading !== undefined && !this.reader;
@@ -61,7 +64,7 @@ export class WorkerSlot {
     if (this.isReady) this.#send(job);
   }
 
-  /** The script runs. */
+  /** Call when the script has started. */
   begin(): void {
     clearTimeout(this.startTimer);
     this.isReady = true;
@@ -69,7 +72,7 @@ export class WorkerSlot {
     for (const job of this.jobs.values()) this.#send(job);
   }
 
-  /** The job is done, or nobody wants it any more. */
+  /** Call when the job is done or canceled. */
   drop(job: Job): void {
     job.slot = undefined;
     this.helpers.get(job.id)?.();

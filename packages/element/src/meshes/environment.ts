@@ -1,18 +1,25 @@
-/** The light around meshes: the room of model-viewer and of three.js's `RoomEnvironment`, prefiltered for each roughness as three.js's `PMREMGenerator` has it. */
+/**
+ * The light of meshes: the environment of model-viewer and of three.js's `RoomEnvironment`, prefiltered for each
+ * roughness as in three.js's `PMREMGenerator`.
+ */
 import { CubeRenderTarget, HalfFloatType, LinearMipmapLinearFilter, type WebGPURenderer } from './three.js';
 
-/** Pixels of a side of a face, for mirrors; each level of more roughness has half of them. Lights are blurred by {@link SHADER}'s SIGMA, so more are not seen. */
+/**
+ * Side of a face in pixels, for mirrors; each level of higher roughness has half of it. Lights are blurred by {@link
+ * SHADER}'s SIGMA, so more resolution is invisible.
+ */
 const SIZE = 128;
 /** The last one has faces of 8 x 8. */
 const LEVELS = 5;
-/** The least sharp level that others are made of. */
+/** Sharpness level that coarser ones are derived from. */
 const SHARPER = 2;
 /** Invocations of a workgroup along each side. */
 const GROUP = 8;
 
 /**
- * Rays into boxes, in place of a scene that three.js draws: it assembles the shaders of six materials on the page's thread, which takes a quarter of a second, and filters faces of 256
- * pixels in 256 samples each, which a processor that draws takes seconds for.
+ * Casts rays into boxes instead of rendering a scene with three.js, which would compile the shaders of six materials on
+ * the main thread for a quarter of a second, and filter faces of 256 pixels with 256 samples each, which takes a
+ * software adapter seconds.
  */
 const SHADER = /* wgsl */ `
 const SIZE = ${SIZE}.0;
@@ -168,7 +175,7 @@ fn rougher(@builtin(global_invocation_id) id: vec3u) {
 }
 `;
 
-/** Fulfils with the light, prefiltered on the GPU; its texture is the environment of three.js's materials. */
+/** Resolves with the light, prefiltered on the GPU; its texture is the environment of three.js's materials. */
 export async function makeEnvironment(device: GPUDevice, renderer: WebGPURenderer): Promise<CubeRenderTarget> {
   const label = 'gs.mesh_environment';
   const module = device.createShaderModule({ label, code: SHADER });
@@ -214,7 +221,7 @@ export async function makeEnvironment(device: GPUDevice, renderer: WebGPURendere
   return target;
 }
 
-/** A cube of three.js's with its levels, on the GPU. */
+/** Allocates a cube texture of three.js with its levels, on the GPU. */
 function targetOf(renderer: WebGPURenderer): CubeRenderTarget {
   const target = new CubeRenderTarget(SIZE, {
     type: HalfFloatType,

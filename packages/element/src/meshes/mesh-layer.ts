@@ -29,30 +29,30 @@ import { light, showAsDisplayed, showThrough } from './shown-colors.js';
 /** Samples of a pixel. */
 const SAMPLES = 4;
 
-/** Kinds of triangles, drawn one after the other. */
+/** Kinds of triangles, drawn in this order. */
 const [OPAQUE, TRANSPARENT] = [0, 1];
 
-/** A texture of three.js's, with the depths of its samples and one depth a pixel. */
+/** A texture of three.js, with the depths of its samples and one depth for each pixel. */
 interface Drawn {
   readonly color: GPUTexture;
   readonly texture: GPUTexture;
 }
 
-/** What a ray has met: names as the file has them, empty where it has none. */
+/** Result of a ray cast: names as in the file, empty if there are none. */
 export interface MeshHit {
   readonly model: MeshModel;
   readonly mesh: string;
   readonly material: string;
 }
 
-/** Draws meshes with three.js on the element's device, as layers of color and depth that splats are painted among. */
+/** Draws meshes with three.js on the element's device, as layers of color and depth among the splats. */
 export class MeshLayer {
   readonly device: GPUDevice;
   readonly #renderer: WebGPURenderer;
   readonly #scene = new Scene();
   readonly #camera = new ThreeCamera();
   readonly #target = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
-  /** What is transparent, behind nothing that is opaque: it has the depth of that, too. */
+  /** Transparent surfaces that no opaque one hides; its depth starts with the opaque one. */
   readonly #glass = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
   readonly #resolve: MeshResolve;
   #depth: { readonly key: readonly unknown[]; readonly ofSplats: SceneDepth } | undefined;
@@ -82,7 +82,7 @@ export class MeshLayer {
       reversedDepthBuffer: true,
       alpha: true,
     });
-    // The element knows of losses itself, and the device is the page's: whose errors are its own.
+    // The element handles losses itself, and errors of the page's device belong to the page.
     renderer.onDeviceLost = () => undefined;
     await renderer.init();
     device.onuncapturederror = onuncapturederror;
@@ -90,7 +90,10 @@ export class MeshLayer {
     return new MeshLayer(device, renderer, await makeEnvironment(device, renderer));
   }
 
-  /** Compiles what a model is drawn with, a few milliseconds of the page's thread at a time, and on the GPU without holding up other work. */
+  /**
+   * Compiles the materials of a model, a few milliseconds of the main thread at a time, and on the GPU without blocking
+   * other work.
+   */
   async compile(model: Model): Promise<void> {
     this.#show(model);
     for (const [kind, target] of [
@@ -99,7 +102,7 @@ export class MeshLayer {
     ] as const) {
       this.#camera.layers.set(kind);
       this.#renderer.setRenderTarget(target);
-      // The list of what to compile is made before the first await: nothing of it is out of sight.
+      // The compile list is built before the first await, so culling is disabled for it.
       const culled = model.setCulling(false);
       const compiled = this.#renderer.compileAsync(this.#scene, this.#camera);
       model.setCulling(culled);
@@ -121,7 +124,7 @@ export class MeshLayer {
     return { depth: this.#depthFor(opaque, glass) };
   }
 
-  /** Draws the triangles of a kind. What is transparent comes second, and is hidden by what is opaque. */
+  /** Draws the triangles of a kind. Transparent ones come second, and are hidden by opaque ones. */
   #drawKind(kind: number, target: RenderTarget): Drawn {
     const renderer = this.#renderer;
     this.#camera.layers.set(kind);
@@ -133,7 +136,7 @@ export class MeshLayer {
     return { color, texture: this.#resolve.run(kind, samples) };
   }
 
-  /** Ends what was found of splats where a mesh is nearer. */
+  /** Corrects the probe results of splats behind meshes. */
   async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
     const { width = 0, height = 0 } = this.#resolve.depth ?? {};
     const within = (at: number, size: number): number => Math.min(size - 1, Math.max(0, Math.floor(at)));
@@ -149,7 +152,7 @@ export class MeshLayer {
     });
   }
 
-  /** The first triangle that a ray meets, as of the last frame: origin and direction in viewer space. */
+  /** The first triangle on a ray in the last frame: origin and direction in viewer space. */
   hit(origin: Point, direction: Point): MeshHit | null {
     const ray = new Raycaster(new Vector3(...origin), new Vector3(...direction));
     ray.layers.enableAll();
@@ -186,7 +189,7 @@ export class MeshLayer {
     return this.#depth.ofSplats;
   }
 
-  /** Puts models where they are, in viewer space, which is that of lights. */
+  /** Sets the transforms of models in viewer space, the space of the lights. */
   #arrange(models: readonly PlacedModel[], world: ViewerFrame): void {
     const toViewer = matrixOfFrame(world);
     for (const [model, root] of this.#shown) {
@@ -214,7 +217,7 @@ export class MeshLayer {
       materials.forEach(showAsDisplayed);
       const isGlass = materials.some(({ transparent }) => transparent);
       mesh.layers.set(isGlass ? TRANSPARENT : OPAQUE);
-      // Splats lie before it or behind it.
+      // Splats are in front of it or behind it.
       for (const material of isGlass ? materials : []) {
         material.depthWrite = true;
         material.alphaTest = 1 / 255;
@@ -230,7 +233,7 @@ export class MeshLayer {
     this.#camera.matrixWorldInverse.fromArray(transposed(view));
     this.#camera.matrixWorld.copy(this.#camera.matrixWorldInverse).invert();
     this.#camera.matrix.copy(this.#camera.matrixWorld);
-    // Depth is near / z: 1 at the near plane, 0 infinitely far.
+    // Depth is near / z: 1 at the near plane, 0 at infinity.
     const projection = [
       ...[(2 * fx) / width, 0, 1 - (2 * cx) / width, 0],
       ...[0, (2 * fy) / height, (2 * cy) / height - 1, 0],

@@ -1,4 +1,4 @@
-/** Loaded when an element has meshes: three.js is behind this module. */
+/** Loaded when an element has meshes: only this module depends on three.js. */
 import { multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
@@ -13,7 +13,7 @@ import { MeshLayer, type MeshHit } from './mesh-layer.js';
 import type { Model } from './model.js';
 import { fetchMesh, openModel } from './open-mesh.js';
 
-/** A mesh where it is drawn. */
+/** A mesh with its transform. */
 export interface PlacedModel {
   readonly model: MeshModel;
   readonly toWorld: Matrix4;
@@ -21,7 +21,7 @@ export interface PlacedModel {
 
 /** From a glTF's axes, y up, to those of the cloud that its splats are read as. */
 const GLTF_TO_CLOUD: Matrix4 = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-/** What meshes ask of the element. */
+/** Interface of the element for meshes. */
 interface MeshStage {
   readonly frame: ViewerFrame;
   warn(sentence: string): void;
@@ -33,7 +33,7 @@ const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 export class Meshes {
   readonly #sources: { readonly members: readonly Member[] };
   readonly #stage: MeshStage;
-  /** What draws them, where there are some. */
+  /** The layer that draws them, if there are any. */
   #layer: MeshLayer | undefined;
   #preparing = Promise.resolve();
 
@@ -42,7 +42,7 @@ export class Meshes {
     this.#stage = stage;
   }
 
-  /** Meshes that are drawn, and where. */
+  /** Drawn meshes with their transforms. */
   get #models(): readonly PlacedModel[] {
     return this.#sources.members.flatMap(({ scene, placement }) => {
       const { model, hasMeshes } = scene;
@@ -57,7 +57,7 @@ export class Meshes {
     return this.#models.map(({ model }) => model.version).join();
   }
 
-  /** Makes the layer of a device, once, and compiles what a model is drawn with. */
+  /** Creates the layer of a device, once, and compiles the materials of a model. */
   prepare({ device, model }: Pick<LoadedGaussians, 'device' | 'model'>): Promise<void> {
     const prepare = async (): Promise<void> => {
       if (this.#layer?.device !== device) {
@@ -72,7 +72,10 @@ export class Meshes {
     return prepared;
   }
 
-  /** Fetches the triangles of a file that has splats, too. Rejects with the signal's reason if the splats are gone meanwhile. */
+  /**
+   * Fetches the triangles of a file that has splats, too. Rejects with the signal's reason if the splats are gone
+   * meanwhile.
+   */
   async add(
     { attributes, services, memoryBudget, scene: { url } }: SourceEntry,
     scene: LoadedGaussians,
@@ -88,25 +91,28 @@ export class Meshes {
     scene.model = model;
   }
 
-  /** Draws them into a frame. @returns where splats are drawn over them */
+  /** Draws them into a frame. @returns The target for splats over them. */
   draw(frame: Frame): Partial<FrameTarget> {
     const models = this.#models;
     return this.#layer && models.length > 0 ? this.#layer.draw(frame, models, this.#stage.frame) : {};
   }
 
-  /** Ends what was found of splats where a mesh is nearer. */
+  /** Corrects the probe results of splats behind meshes. */
   async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
     return this.#layer && this.#models.length > 0 ? this.#layer.probe(points, answers) : answers;
   }
 
-  /** Whose triangle a ray meets first, and the names of the mesh and its material; null for none. Origin and direction in viewer space. */
+  /**
+   * The source of the first triangle on a ray, and the names of the mesh and its material; null for none. Origin and
+   * direction in viewer space.
+   */
   hit(origin: Vector3, direction: Vector3): (Omit<MeshHit, 'model'> & { readonly member: Member }) | null {
     const met = this.#layer?.hit(origin, direction);
     const member = met && this.#sources.members.find(({ scene }) => scene.model === met.model);
     return member ? { member, mesh: met.mesh, material: met.material } : null;
   }
 
-  /** Frees what nothing needs any more. */
+  /** Frees unused resources. */
   forget(): void {
     if (this.#sources.members.some(({ scene }) => scene.model)) return;
     this.#layer?.destroy();

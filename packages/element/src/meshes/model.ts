@@ -14,21 +14,21 @@ import {
   Texture,
 } from './three.js';
 
-/** Just before the end: at the end itself an animation begins anew. */
+/** Just before the end, because at the end itself an animation restarts. */
 const BEFORE_END = 1e-4;
-/** The triangles of a glTF, as three.js has them. */
+/** The triangles of a glTF as objects of three.js. */
 export class Model {
   readonly root: Group;
   readonly triangles: number;
   /** Bytes of GPU memory of geometry and textures. */
   readonly byteLength: number;
-  /** In its own frame, y up. */
+  /** In its own coordinates, y up. */
   readonly bounds: Bounds;
-  /** Seconds of its longest animation; NaN without. */
+  /** Duration of its longest animation in seconds; NaN without. */
   readonly duration: number;
-  /** It brings lights of its own. */
+  /** Whether it has its own lights. */
   readonly hasLights: boolean;
-  /** Grows when an animation has moved it. */
+  /** Incremented when an animation has moved it. */
   version = 0;
   readonly #mixer: AnimationMixer | undefined;
   readonly #meshes: readonly Mesh[];
@@ -57,15 +57,16 @@ export class Model {
     if (animations.length === 0) return;
     this.#mixer = new AnimationMixer(root);
     for (const clip of animations) this.#mixer.clipAction(clip).play();
-    // What bones move may be anywhere.
+    // Skinned meshes may leave their bounds.
     this.setCulling(false);
     this.setTime(0);
   }
 
   /**
-   * Makes objects of a file that has been checked: the loader of three.js finds all buffer views and images in its cache, and fetches nothing.
-   * @param url for messages
-   * @param reservation its GPU memory, which is given back with the model, or when this rejects
+   * Creates the objects of a validated file: the loader of three.js finds all buffer views and images in its cache, and
+   * fetches nothing.
+   * @param url Address for messages.
+   * @param reservation Its GPU memory, which is released with the model, or when this rejects.
    * @throws GaussianSplatError `decode/*`
    */
   static async read(mesh: LoadedMesh, url: string, reservation: Reservation): Promise<Model> {
@@ -73,7 +74,7 @@ export class Model {
       const views = await unpackedViews(mesh.views, url);
       const loader = new GLTFLoader();
       loader.register((parser) => ({ name: 'checked', beforeRoot: () => fill(parser, views, mesh.images) }));
-      // Typed as a file, but the loader takes JSON as well.
+      // Typed as a file, but the loader accepts JSON as well.
       return new Model(await loader.parseAsync(mesh.json, ''), reservation);
     } catch (error) {
       reservation.release();
@@ -81,14 +82,14 @@ export class Model {
     }
   }
 
-  /** Moves what is animated to a time, in seconds. */
+  /** Sets animations to a time, in seconds. */
   setTime(seconds: number): void {
     if (this.#mixer === undefined) return;
     this.#mixer.setTime(Math.min(Math.max(0, seconds), this.duration - BEFORE_END));
     this.version++;
   }
 
-  /** Whether meshes that the camera does not see are left out. @returns whether they were */
+  /** Culls meshes outside the camera's view, or not. @returns the previous setting */
   setCulling(isOn: boolean): boolean {
     const wasOn = this.#meshes.some(({ frustumCulled }) => frustumCulled);
     for (const mesh of this.#meshes) mesh.frustumCulled = isOn;
@@ -125,7 +126,7 @@ const texturesOf = (material: Material): Texture[] =>
     (value): value is Texture => value !== null && typeof value === 'object' && 'isTexture' in value,
   );
 
-/** Puts the bytes of a file where the loader looks before it fetches. */
+/** Puts the bytes of a file into the cache that the loader reads before it fetches. */
 async function fill(
   { cache, sourceCache }: GLTFParser,
   views: readonly (ArrayBuffer | undefined)[],

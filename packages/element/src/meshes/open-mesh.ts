@@ -76,7 +76,7 @@ export async function openMesh(request: SceneRequest, options: OpenOptions): Pro
   }
 }
 
-/** The animations of a model as what moves a scene. */
+/** Exposes the animations of a model as the timeline of a scene. */
 function timelineOf(model: Model, onShown: (seconds: number) => void): Timeline {
   let shown = 0;
   return {

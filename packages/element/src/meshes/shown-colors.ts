@@ -1,7 +1,7 @@
-/** The colors in which meshes are drawn: those of the screen, so that they blend with splats, which are trained in them. */
+/** Meshes are drawn in display-referred colors, like the colors of trained splats, so that the two blend. */
 import { neutralToneMapping, output, sRGBTransferOETF, vec4, type Material, type Texture } from './three.js';
 
-/** Of the light around, so that a rough gray surface that faces the camera keeps its base color. */
+/** Intensity of the surrounding light that leaves the base color of a rough gray surface facing the camera unchanged. */
 const EVEN_LIGHT = 0.62;
 
 /** Lit materials go through Khronos' PBR Neutral. An unlit one (`KHR_materials_unlit`) has its base color. */
@@ -11,7 +11,8 @@ export function showAsDisplayed(material: Material): void {
 }
 
 /**
- * Glass lets through what is behind it, splats among it: to a share, as `alphaMode: BLEND` has it. What is behind keeps its color: a layer has one alpha for red, green and blue.
+ * Glass transmits the splats and meshes behind it by a fraction, like `alphaMode: BLEND`. It does not tint them: a
+ * layer has one alpha for red, green and blue.
  */
 export function showThrough(material: Material): void {
   if (!material.transmission) return;

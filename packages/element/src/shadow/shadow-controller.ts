@@ -1,4 +1,4 @@
-/** Loaded where an element has the attribute `shadow-intensity`: the shadow under what it shows. */
+/** Draws the shadow under the scene; loaded for elements with the attribute `shadow-intensity`. */
 import { eyeOf, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
 import { GaussianBuffers, type FrameTarget, type Placement, type World } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
@@ -16,7 +16,7 @@ import type { Member } from '../member.js';
 import { shadowSplats, takeShadow, type ShadowMap, type TakeAlpha } from './shadow-map.js';
 import { packSplats } from './splat-file.js';
 
-/** What the shadow asks of its element. */
+/** The interface of the element that the shadow uses. */
 export interface ShadowHost {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly attributes: Pick<Attributes, 'shadowIntensity' | 'shadowSoftness'>;
@@ -38,9 +38,9 @@ export interface ShadowHost {
   warn(sentence: string): void;
 }
 
-/** A shadow of what moves is made anew no oftener than this, ms, nor than a tenth of the time. */
+/** A moving scene's shadow is updated at most this often, ms, and takes at most a tenth of the time. */
 const [LEAST_MS, SHARE] = [500, 10];
-/** The shadow fades while the eye goes from so far above the ground, in radii, to the ground: from below nobody sees it. */
+/** Camera height above the ground, in radii, below which the shadow fades out: it is invisible from below. */
 const FADE = 0.08;
 
 /** How dark and how soft: `shadow-intensity` and `shadow-softness`. */
@@ -63,15 +63,15 @@ interface Shown {
   readonly map: ShadowMap;
   /** From its own square to the world. */
   readonly toWorld: Matrix4;
-  /** 0..1: what of it the camera sees. */
+  /** @param opacity 0..1, visibility of the shadow to the camera */
   fade(opacity: number): void;
   remove(): void;
 }
 
-/** Takes images of what is shown when that has changed, makes flat splats of them, and puts these under it. */
+/** Captures images of the scene when it has changed, makes flat splats of them, and puts these under the scene. */
 export class ShadowController implements ReactiveController, Mover {
   readonly #stage: ShadowHost;
-  /** What the shadow is of. */
+  /** The content that the current shadow was made for. */
   #key = '';
   #shown: Shown | undefined;
   #isBusy = false;
@@ -104,7 +104,7 @@ export class ShadowController implements ReactiveController, Mover {
     return false;
   }
 
-  /** Changes whenever the shadow would; empty for none. */
+  /** Changes whenever the shadow would; empty without a shadow. */
   #contentKey(): string {
     const { sources } = this.#stage;
     const { intensity, softness } = readShadow(this.#stage);
@@ -118,7 +118,7 @@ export class ShadowController implements ReactiveController, Mover {
 
   #renew(painter: Painter, key: string, now: number): void {
     if (now < this.#notBefore) {
-      // What has ended its motion has a shadow of its last pose.
+      // The shadow of a finished motion shows the last pose.
       this.#timer ??= setTimeout(() => {
         this.#timer = undefined;
         this.#stage.requestFrame();
@@ -161,7 +161,7 @@ export class ShadowController implements ReactiveController, Mover {
     }
   }
 
-  /** Takes images, and shows shadows, with what the painter draws with. */
+  /** Captures images and shows shadows with the painter's own API. */
   async #taker(painter: Painter): Promise<Taker> {
     if (painter.place.context instanceof WebGL2RenderingContext) {
       const { glTaker } = await import('./gl-shadow.js');
@@ -202,7 +202,7 @@ export class ShadowController implements ReactiveController, Mover {
   }
 }
 
-/** Where images are taken, and shadows shown. */
+/** Captures images, and draws shadows. */
 export interface Taker {
   readonly take: TakeAlpha;
   show(packed: Parameters<typeof GaussianBuffers.upload>[1], map: ShadowMap, toWorld: Matrix4): Promise<Shown>;

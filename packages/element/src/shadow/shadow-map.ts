@@ -1,4 +1,4 @@
-/** A contact shadow from images of what stands on the ground: from above, for what lies within four heights. Pure. */
+/** A contact shadow from images of the subject above the ground: taken from above, within four heights. Pure. */
 import { lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { toScene, type ViewerFrame } from '../camera/orbit.js';
 import type { SplatRow } from './splat-file.js';
@@ -7,13 +7,13 @@ import type { SplatRow } from './splat-file.js';
 export const SHADOW_PIXELS = 128;
 /** Splats of a side of the shadow; the standard deviation of each, in distances between them. */
 const [CELLS, SPREAD] = [48, 0.75];
-/** Of the ball around the subject, half of a side of the shadow: a soft edge reaches beyond what casts it. */
+/** Half of the shadow's side relative to the radius of the subject's sphere: a soft edge extends beyond its caster. */
 const REACH = 1.5;
 /** How far the camera stands away, in radii: its rays are as good as parallel. */
 const DISTANCE = 40;
 /**
- * Heights below which something casts a shadow, as shares of the subject's, how much of the darkness is theirs, and how far they blur it, in shares of a side at
- * `shadow-softness="1"`: what touches the ground darkens it most and has the sharpest edge.
+ * Layers of the shadow: height as a fraction of the subject's, weight of its darkness, and blur radius as a fraction of
+ * the side at `shadow-softness="1"`. Parts that touch the ground darken it most and have the sharpest edge.
  */
 const LAYERS = [
   { height: 0.08, weight: 0.25, blur: 0.012 },
@@ -23,12 +23,12 @@ const LAYERS = [
 ] as const;
 /** Opacity of the darkest shadow. */
 const DARKEST = 0.8;
-/** Share of the subject's silhouette that may lie below the ground. */
+/** Fraction of the subject's silhouette that may lie below the ground. */
 const BELOW = 0.005;
-/** Opacity, of 255, from which on a splat shows. */
+/** Minimum opacity of a visible splat, 0..255. */
 const LEAST_CODE = 1;
 
-/** What casts the shadow: a ball in viewer space, and where its ground is. */
+/** The caster of the shadow: a sphere in viewer space, and the height of its ground. */
 export interface Subject {
   readonly center: Vector3;
   readonly radius: number;
@@ -51,7 +51,7 @@ export interface ShadowMap {
   readonly layers: readonly Alpha[];
 }
 
-/** Takes the images that the shadow of a subject is made from. Null where there is nothing to cast one. */
+/** Captures the images of a subject's shadow. @returns null without a caster */
 export async function takeShadow(subject: Subject, take: TakeAlpha): Promise<ShadowMap | null> {
   const { center, radius } = subject;
   const side = extent(await take(sideCamera(subject)));
@@ -64,14 +64,14 @@ export async function takeShadow(subject: Subject, take: TakeAlpha): Promise<Sha
   return { middle: [center[0], ground, center[2]], half, layers };
 }
 
-/** From the front, as large as the ball. */
+/** Camera in front of the subject, framing its sphere. */
 const sideCamera = ({ center: [x, y, z], radius, frame }: Subject): Camera => {
   const away = DISTANCE * radius;
   const focal = (SHADOW_PIXELS * away) / (2 * radius);
   return camera(frame, [x, y, z + away], [x, y, z], [0, 1, 0], focal, away - radius, away + radius);
 };
 
-/** From above, as large as the shadow: what is higher than a height above the ground is cut off. */
+/** Camera above the subject, framing the shadow: parts above the height are clipped. */
 const cameraAbove = ({ center: [x, , z], radius, frame }: Subject, ground: number, height: number): Camera => {
   const away = DISTANCE * radius;
   const focal = (SHADOW_PIXELS * away) / (2 * REACH * radius);
@@ -93,7 +93,7 @@ function camera(
   return { ...size, fx: focal, fy: focal, worldToCamera: lookAt(from, to, above), near, far };
 }
 
-/** The first and the last row of a silhouette, as shares of the image's height, but for specks. */
+/** First and last row of a silhouette as fractions of the image's height, without specks. */
 function extent(alpha: Alpha): { first: number; last: number } | null {
   const rows = Array.from({ length: SHADOW_PIXELS }, (_, row) => {
     let sum = 0;
@@ -125,13 +125,13 @@ export function shadowSplats({ layers }: ShadowMap, intensity: number, softness:
   });
   const step = 2 / CELLS;
   const sigma = SPREAD * step;
-  // Around each point the weights of all splats sum to this.
+  // Sum of all splat weights at each point.
   const overlap = 2 * Math.PI * SPREAD * SPREAD;
   const rows: SplatRow[] = [];
   for (let row = 0; row < CELLS; row++)
     for (let column = 0; column < CELLS; column++) {
       const opacity = Math.min(0.99, DARKEST * intensity * meanOf(dark, column, row));
-      // Optical depths add up where opacities do not.
+      // Optical depths are additive; opacities are not.
       const own = 1 - Math.exp(Math.log(1 - opacity) / overlap);
       const code = Math.round(255 * own);
       if (code < LEAST_CODE) continue;

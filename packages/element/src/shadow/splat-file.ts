@@ -5,10 +5,10 @@ import type { LoadedScene } from '../loading/protocol.js';
 /** Bytes of a splat in a `.splat` file: position and scale as float32, color and opacity, rotation. */
 const ROW_BYTES = 32;
 
-/** A splat that is not turned: its center, its standard deviations, and red, green, blue and opacity of 255. */
+/** An axis-aligned splat: center, standard deviations, and red, green, blue and opacity, 0..255. */
 export type SplatRow = readonly [place: Vector3, scale: Vector3, color: readonly [number, number, number, number]];
 
-/** Splats of the element's own as a `.splat` file, with their axes as given. */
+/** Writes splats made by the element as a `.splat` file without a change of axes. */
 export function splatFile(rows: readonly SplatRow[]): ArrayBuffer {
   const view = new DataView(new ArrayBuffer(ROW_BYTES * rows.length));
   rows.forEach(([place, scale, color], i) => {
@@ -20,7 +20,7 @@ export function splatFile(rows: readonly SplatRow[]): ArrayBuffer {
   return view.buffer;
 }
 
-/** Packs such splats as those of any scene. */
+/** Packs such splats like those of any scene. */
 export async function packSplats(
   rows: readonly SplatRow[],
   loader: SceneLoader,

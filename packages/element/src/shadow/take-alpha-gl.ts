@@ -4,8 +4,8 @@ import { DATA_WIDTH, type GlRenderer } from '@gaussian-splat/renderer/webgl';
 import { SHADOW_PIXELS, type Alpha, type TakeAlpha } from './shadow-map.js';
 
 /**
- * @param renderer that draws the scene: it gets another order, as the order of splats makes no difference to their opacity
- * @param kept numbers of the splats that count
+ * @param renderer of the scene; its order is replaced, which does not affect opacity
+ * @param kept indices of the splats that are drawn
  */
 export function alphaOfScene(
   gl: WebGL2RenderingContext,

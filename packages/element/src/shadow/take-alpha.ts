@@ -1,4 +1,4 @@
-/** Opacity of all that a painter draws with WebGPU, in small images. Reads back: never for a frame. */
+/** Opacity of everything that a WebGPU painter draws, in small images. Reads back, so it is never part of a frame. */
 import type { Camera, SplatFilter } from '@gaussian-splat/core';
 import {
   capture,
@@ -16,7 +16,7 @@ export interface AlphaSource {
   readonly members: readonly Member[];
   readonly settings: FrameSettings;
   readonly filter: SplatFilter | undefined;
-  /** Draws what is no splats. */
+  /** Draws the meshes beneath the splats. */
   drawBeneath(camera: Camera): Partial<FrameTarget>;
 }
 
@@ -40,7 +40,7 @@ export function alphaOfWorld({ device, members, settings, filter, drawBeneath }:
   };
 }
 
-/** A scene with what it holds now: a view from above asks for no pages of a streamed one. */
+/** A scene in its current state: a view from above requests no pages of a streamed scene. */
 const asItIs = (scene: GaussianScene): GaussianScene => {
   const { count, shDegree, shPrecision, antialiased, filterVariance, origin, pages, version } = scene;
   return { count, shDegree, shPrecision, antialiased, filterVariance, origin, pages, version };

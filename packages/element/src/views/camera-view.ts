@@ -1,10 +1,10 @@
-/** Places for the camera, in all the forms that pages and files have them, and the poses that they mean. */
+/** Camera views in all forms used by pages and files, and their poses. */
 import { GaussianSplatError, inverse, length, normalize, subtract, type Vector3 } from '@gaussian-splat/core';
 import { fieldOfViewGrammar, orbitGrammar, targetGrammar, type AttributeGrammar } from '../camera/grammar.js';
 import { toViewer, type CameraPose, type ViewerFrame } from '../camera/orbit.js';
 import { poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 
-/** A view in the words of the attributes. What is left out stays as it is. */
+/** A view in the syntax of the attributes. Omitted parts keep their value. */
 export interface OrbitView {
   /** As `camera-orbit`. */
   readonly orbit?: string;
@@ -16,7 +16,7 @@ export interface OrbitView {
 
 /** A camera of a trainer's `cameras.json`: in the scene's own frame, OpenCV axes (x right, y down, z forward). */
 export interface TrainerView {
-  /** Where the eye is, world units. */
+  /** Position of the eye, world units. */
   readonly position: readonly number[];
   /** 3x3 camera to world, rows outermost: its columns are the camera's axes. */
   readonly rotation: readonly (readonly number[])[];
@@ -37,25 +37,26 @@ export interface MatrixView {
 export interface LookView {
   readonly position: readonly number[];
   readonly lookAt: readonly number[];
-  /** Whose numbers these are. Default: `viewer`, the space of `camera-target`. The viewer of SuperSplat turns every scene by half a turn around z. */
+  /**
+   * Coordinate system of the numbers. Default: `viewer`, the space of `camera-target`. The viewer of SuperSplat turns
+   * every scene by half a turn around z.
+   */
   readonly space?: 'viewer' | 'supersplat';
   /** Degrees, along the longer side of the image; without it the field of view stays. */
   readonly fov?: number;
 }
 
-/**
- * A place for the camera. The camera stands upright: the roll of a matrix is left out.
- */
+/** A camera view. The camera stays upright: the roll of a matrix is ignored. */
 export type CameraView = OrbitView | TrainerView | MatrixView | LookView;
 
-/** What a view is read against. */
+/** Context that a view is resolved in. */
 export interface ViewContext {
   readonly settings: CameraSettings;
   readonly bounds: SceneBounds;
   readonly frame: ViewerFrame;
-  /** Width / height of the picture. */
+  /** Aspect ratio of the image, width / height. */
   readonly aspect: number;
-  /** Where the camera is going now: parts that a view leaves out stay. */
+  /** Goal of the camera; provides the parts that a view omits. */
   readonly from: CameraPose;
 }
 
@@ -134,7 +135,7 @@ function ofLook({ position, lookAt, space, fov }: LookView, context: ViewContext
   );
   const way = subtract(target, eye);
   if (!(length(way) > 0)) throw fail('view.lookAt', 'another point than view.position', lookAt);
-  // The longer side of the picture has the angle; ours is the vertical one.
+  // The angle is along the longer side of the image; the element uses the vertical one.
   const half = fov === undefined ? undefined : Math.tan((fov * Math.PI) / 360) / Math.max(1, context.aspect);
   const pose = ofRay(eye, way, half === undefined ? undefined : 2 * Math.atan(half), context);
   return { ...pose, radius: length(way), x: target[0], y: target[1], z: target[2] };
@@ -144,10 +145,10 @@ function ofLook({ position, lookAt, space, fov }: LookView, context: ViewContext
 const vertical = (height: number | undefined, focal: number | undefined): number | undefined =>
   height! > 0 && focal! > 0 ? 2 * Math.atan(height! / (2 * focal!)) : undefined;
 
-/** Closest that the point to turn around may be ahead of the eye, in radii of the scene. */
+/** Minimum distance of the pivot in front of the eye, in radii of the scene. */
 const LEAST_AHEAD = 0.1;
 
-/** A camera at an eye that looks along a direction turns around the point ahead of it that is nearest to the middle of the scene. */
+/** A camera with an eye and a direction pivots around the point ahead that is nearest to the center of the scene. */
 function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined, context: ViewContext): CameraPose {
   const { bounds, frame, from } = context;
   const forward = normalize(direction);

@@ -1,8 +1,10 @@
-/** One motion of the camera along a path of time: from a frame to the next, until it has arrived or somebody else moves the camera. */
+/**
+ * A camera motion along a path over time, advanced per frame until it arrives or the camera is moved by something else.
+ */
 import type { CameraPose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 
-/** How long after its end a flight whose frames do not come is over, ms. */
+/** Grace period after its end for a flight whose frames have stopped, ms. */
 const GRACE_MS = 100;
 
 export class Flight {
@@ -13,7 +15,7 @@ export class Flight {
   #placed: CameraPose | undefined;
   #end: ((arrived: boolean) => void) | undefined;
   readonly #timer: ReturnType<typeof setTimeout> | undefined;
-  /** Fulfils at the end: whether it has arrived. */
+  /** Fulfills at the end with true on arrival. */
   readonly finished: Promise<boolean>;
 
   /** @param durationMs 0 jumps; Infinity never arrives */
@@ -33,7 +35,7 @@ export class Flight {
   /** @param now requestAnimationFrame's clock, ms */
   advance(now: number): void {
     if (this.isOver) return;
-    // Hands, attributes, another scene: whoever moves the camera has it.
+    // User input, attributes or another scene that moves the camera takes over.
     if (this.#isElsewhere) return this.cancel();
     this.#start ??= now;
     const elapsed = now - this.#start;

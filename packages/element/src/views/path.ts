@@ -1,7 +1,7 @@
-/** Ways from pose to pose. Pure. */
+/** Interpolated paths between poses. Pure. */
 import type { CameraPose } from '../camera/orbit.js';
 
-/** How a flight sets out and arrives: a name as in CSS, or a function of 0..1. */
+/** Acceleration and deceleration of a flight: a CSS easing name, or a function of 0..1. */
 export type Easing = 'linear' | 'ease-in' | 'ease-out' | 'ease-in-out' | ((share: number) => number);
 
 const EASINGS: Readonly<Record<Extract<Easing, string>, (share: number) => number>> = {
@@ -22,16 +22,16 @@ export function unwound(pose: CameraPose, before: CameraPose): CameraPose {
   return turns === 0 ? pose : { ...pose, theta: pose.theta - turns * 2 * Math.PI };
 }
 
-/** Distances go by factors: half of the way from 1 m to 4 m is 2 m. */
+/** Distances are interpolated geometrically: halfway from 1 m to 4 m is 2 m. */
 const rise = (pose: CameraPose, key: (typeof KEYS)[number]): number =>
   key === 'radius' ? Math.log(pose.radius) : pose[key];
 
-/** A way from a time to a pose. */
+/** Maps a time to a pose. */
 export type Path = (time: number) => CameraPose;
 
 /**
- * A smooth path through poses: Catmull and Rom's cubic through values and times.
- * @param times one for each pose, rising.
+ * A smooth path through poses: a Catmull-Rom cubic through values and times.
+ * @param times one for each pose, ascending.
  * @returns a function of a time, which is clamped to those; at the time of a pose it returns exactly that pose
  */
 export function pathThrough(poses: readonly CameraPose[], times: readonly number[]): Path {
@@ -61,7 +61,7 @@ export function pathThrough(poses: readonly CameraPose[], times: readonly number
   };
 }
 
-/** A number `i` with `times[i] <= time < times[i + 1]`, of a time between the first and the last, by bisection. */
+/** An index `i` with `times[i] <= time < times[i + 1]` for a time between the first and the last, by bisection. */
 function indexBefore(times: readonly number[], time: number): number {
   let [low, high] = [0, times.length - 1];
   while (high - low > 1) {

@@ -7,7 +7,7 @@ export interface NamedView {
   readonly view: CameraView;
 }
 
-/** A moment of a path: where the camera is after so many seconds. */
+/** Camera pose at a time of a path, in seconds. */
 export interface Keyframe {
   readonly time: number;
   readonly view: CameraView;
@@ -15,14 +15,14 @@ export interface Keyframe {
 
 export interface ViewList {
   readonly views: readonly NamedView[];
-  /** A path that the file has besides; empty where the views themselves are the path. */
+  /** A path that the file also contains; empty if the views themselves are the path. */
   readonly path: readonly Keyframe[];
 }
 
 const EXPECTED =
   'a list of views { name, orbit, target, fieldOfView }, the list of a cameras.json, or the settings of SuperSplat (version 1 or 2)';
 
-/** Reads parsed JSON, or the same as an object. Throws `argument/camera`. */
+/** Reads parsed JSON, or an equal object. Throws `argument/camera`. */
 export function readViews(json: unknown): ViewList {
   const list = isObject(json) && Array.isArray(json.views) ? json.views : json;
   if (Array.isArray(list)) return { views: list.map(readView), path: [] };
@@ -38,7 +38,7 @@ function readView(entry: unknown, index: number): NamedView {
   return { name: String(given ?? index + 1), view: entry as CameraView };
 }
 
-/** What SuperSplat calls a camera: degrees along the longer side, points in the space of its viewer. */
+/** SuperSplat's camera format: degrees along the longer side, points in the space of its viewer. */
 interface SuperSplatPose {
   readonly position: readonly number[];
   readonly target: readonly number[];
@@ -85,7 +85,7 @@ function readTrack(
 ): Keyframe[] {
   if (track === undefined) return [];
   const { times, values } = track.keyframes;
-  // Early files have no rate, and count seconds.
+  // Early files lack the frame rate and count seconds.
   const rate = track.frameRate || 1;
   return times.map((time, i) => ({
     time: time / rate,

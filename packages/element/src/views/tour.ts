@@ -13,7 +13,7 @@ import { Flight } from './flight.js';
 import { easingOf, pathThrough, unwound, type Easing, type Path } from './path.js';
 import { readViews, type NamedView, type ViewList } from './read-views.js';
 
-/** How a flight goes. */
+/** Options of a flight. */
 export interface FlightOptions {
   /** Milliseconds; 0 jumps. Default 1200. */
   readonly duration?: number;
@@ -21,25 +21,25 @@ export interface FlightOptions {
   readonly easing?: Easing;
 }
 
-/** How a flight along a path goes. */
+/** Options of a flight along a path. */
 export interface PathOptions {
-  /** Milliseconds for all of the path. Default: what its keyframes say, else 3000 for each of its parts. */
+  /** Milliseconds for the entire path. Default: according to its keyframes, else 3000 per segment. */
   readonly duration?: number;
   /** Default `linear`. */
   readonly easing?: Easing;
-  /** Begins again at the end, until a visitor takes the camera. */
+  /** Restarts at the end, until a visitor takes over the camera. */
   readonly loop?: boolean;
 }
 
 export interface TourHost {
   readonly camera: CameraController;
   readonly behaviours: Behaviours;
-  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  /** Fulfills, and never rejects, when nothing is pending. */
   readonly settled: Promise<unknown>;
   readonly surface: HTMLElement | null;
   readonly strings: SpokenStrings;
   readonly attributes: Pick<Attributes, 'views'>;
-  /** Somebody sees the scene. */
+  /** The scene is visible. */
   readonly isOnShow: boolean;
   warn(sentence: string): void;
   requestFrame(): void;
@@ -87,7 +87,7 @@ const STYLES = css`
   }
 `;
 
-/** The views of an element: its list, the flights between them, and the bar, the keys and the words with which people choose. */
+/** The views of an element: the list, flights between them, and the bar, keys and texts for choosing. */
 export class Tour implements ReactiveController, Mover {
   readonly #element: ReactiveControllerHost & HTMLElement;
   readonly #of: TourHost;
@@ -126,7 +126,7 @@ export class Tour implements ReactiveController, Mover {
   advance(now: number): boolean {
     const flight = this.#flight;
     if (flight === undefined || flight.isOver) return false;
-    // What turns by itself waits until the camera has arrived.
+    // Automatic rotation waits until the camera has arrived.
     this.#of.behaviours.rest();
     flight.advance(now);
     return !flight.isOver;
@@ -143,7 +143,7 @@ export class Tour implements ReactiveController, Mover {
   async step(by: number, options: FlightOptions = {}): Promise<boolean> {
     const { views } = await this.#ready();
     if (views.length === 0) return false;
-    // From nowhere the next one is the first, and the one before is the last.
+    // Without a current view, next is the first and previous is the last.
     const from = this.#current < 0 && by < 0 ? 0 : this.#current;
     return this.flyTo((from + by + views.length) % views.length, options);
   }
@@ -166,7 +166,7 @@ export class Tour implements ReactiveController, Mover {
     this.#of.camera.moveTo(path.at(Math.min(1, Math.max(0, share))));
   }
 
-  /** The list, once it and the scene are there: what is in percent or `auto` is known then. */
+  /** The list after it and the scene are loaded, so that percentages and `auto` can be resolved. */
   async #ready(): Promise<ViewList> {
     await this.#element.updateComplete;
     await this.#of.settled;
@@ -185,12 +185,12 @@ export class Tour implements ReactiveController, Mover {
     return { at: (share) => along(first + share * seconds), seconds };
   }
 
-  /** The path that was computed last: a page that scrolls asks for it in every frame. */
+  /** The last computed path is cached: a page that scrolls asks for it in every frame. */
   #known: { readonly list: unknown; readonly context: string; readonly path: Path } | undefined;
 
   #along(list: unknown, stops: ViewList['path'], times: readonly number[]): Path {
     const { context } = this.#of.camera;
-    // Where the camera is now is no part of it: the path would be another one after each step.
+    // The current camera is left out of the key, which would otherwise change at each step.
     const key = JSON.stringify({ ...context, from: undefined });
     const known = this.#known;
     if (known && known.list === list && known.context === key) return known.path;
@@ -343,7 +343,7 @@ export class Tour implements ReactiveController, Mover {
   };
 }
 
-/** Bytes of a file of views: it is parsed on the page's thread. */
+/** Maximum size of a views file, bytes: it is parsed on the main thread. */
 const MAX_VIEWS = 2 ** 22;
 
 const NO_VIEWS: ViewList = { views: [], path: [] };

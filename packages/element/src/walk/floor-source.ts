@@ -5,10 +5,10 @@ import { isStreamed } from '../gpu/open-scene.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
-/** What a floor is made from. */
+/** Sources and settings of a floor. */
 export interface FloorSource {
   readonly loader: SceneLoader;
-  /** What the scene was asked for by. */
+  /** The request that loaded the scene. */
   readonly request: SceneRequest;
   /** Absolute URL of a `.floor` or `.voxel.json` file; null to make the map from the splats. */
   readonly mapUrl: string | null;

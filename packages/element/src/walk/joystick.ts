@@ -13,7 +13,7 @@ export class Joystick {
     this.element = document.createElement('div');
     this.#knob = document.createElement('div');
     this.element.setAttribute('part', 'joystick');
-    // Those who cannot see it have the arrow keys.
+    // People who cannot see it have the arrow keys.
     this.element.setAttribute('aria-hidden', 'true');
     Object.assign(this.element.style, {
       ...{ position: 'absolute', left: '16px', bottom: '16px', width: '96px', height: '96px', borderRadius: '50%' },

@@ -24,7 +24,7 @@ export interface WalkHost {
   readonly frame: ViewerFrame;
   readonly strings: SpokenStrings;
   readonly services: { readonly sceneLoader: SceneLoader };
-  /** What the scene on show was asked for by; null while there is none, and for what no file has. */
+  /** The request of the displayed scene; null without one, and for sources without a file. */
   readonly walkable: SceneRequest | null;
   requestFrame(): void;
   positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null>;
@@ -37,16 +37,16 @@ const WORDS: Readonly<Record<WalkWord, string>> = {
     'A click on the floor walks there. Home brings the view back.',
   blocked: 'Blocked',
 };
-/** A floor that is smaller is none, m². */
+/** Minimum area of a floor, m². */
 const MIN_AREA = 4;
-/** What a short press is worth at least, ms. */
+/** Minimum duration of a short press, ms. */
 const FIRST_STEP_MS = 50;
-/** Angle that the arrow keys turn by in a second, radians. */
+/** Turning speed of the arrow keys, radians per second. */
 const TURN = 1.5;
-/** Deflection of a stick that counts as none. */
+/** Deflection of a stick below which it is ignored. */
 const DEAD_ZONE = 0.15;
 
-/** Keys to the right, forward, and around to the left. */
+/** Motion of each key: right, forward, and turn to the left. */
 const KEYS: Readonly<Record<string, readonly [right: number, forward: number, turn: number]>> = {
   KeyW: [0, 1, 0],
   KeyS: [0, -1, 0],
@@ -87,7 +87,7 @@ export class WalkController implements ReactiveController, Mover {
     return this.#isRefused;
   }
 
-  /** Help for the keys; undefined unless they walk. */
+  /** Help text for the keys; undefined unless walking. */
   get keys(): string | undefined {
     return this.#of.attributes.navigation === 'walk' && !this.#isRefused ? this.#word('keys-walk') : undefined;
   }
@@ -101,7 +101,7 @@ export class WalkController implements ReactiveController, Mover {
     if (this.#listening !== undefined) return;
     this.#listening = new AbortController();
     const { signal } = this.#listening;
-    // Before the keys that turn an orbit.
+    // Registered before the keys that orbit.
     surface.addEventListener('keydown', this.#onDown, { signal, capture: true });
     surface.addEventListener('keyup', this.#onUp, { signal });
     surface.addEventListener('blur', this.#release, { signal });
@@ -134,7 +134,7 @@ export class WalkController implements ReactiveController, Mover {
     return true;
   }
 
-  /** Walks some meters ahead: what the wheel and two fingers do. */
+  /** Walks forward by some meters, for the wheel and pinch gestures. */
   ahead(meters: number): void {
     const walker = this.#walker;
     if (walker === undefined) return;
@@ -155,7 +155,7 @@ export class WalkController implements ReactiveController, Mover {
     this.#follow();
   }
 
-  /** Puts the camera's eye over the feet. */
+  /** Puts the camera's eye above the feet. */
   #follow(): void {
     const { camera } = this.#of;
     const { at, eyeFloor } = this.#walker!;
@@ -164,7 +164,7 @@ export class WalkController implements ReactiveController, Mover {
     this.#of.requestFrame();
   }
 
-  /** A screen reader hears of a wall once. */
+  /** A wall is announced to screen readers once. */
   #tellBlocked(isWalking: boolean): void {
     const isBlocked = isWalking && this.#walker!.isBlocked;
     if (isBlocked && !this.#isSaid) this.#of.behaviours.announcer.value?.say(this.#word('blocked'));
@@ -172,7 +172,7 @@ export class WalkController implements ReactiveController, Mover {
     this.#isSaid = isBlocked || (this.#isSaid && !isWalking);
   }
 
-  /** Has the floor of the scene made, or fetched, unless it is. */
+  /** Makes or fetches the floor of the scene once. */
   #ask(): void {
     const { walkable: request, camera, frame, services } = this.#of;
     if (request === null) return;
@@ -219,7 +219,7 @@ export class WalkController implements ReactiveController, Mover {
     const keys = event.code in KEYS ? event.code : event.key;
     const direction = KEYS[keys];
     if (!direction || event.ctrlKey || event.altKey || event.metaKey || !this.#walker) return;
-    // With Shift the arrow keys look up and down, as in flight.
+    // Shift with the arrow keys looks up and down, like in flight.
     if (event.shiftKey && keys.startsWith('Arrow')) return;
     event.preventDefault();
     event.stopImmediatePropagation();
@@ -239,7 +239,7 @@ export class WalkController implements ReactiveController, Mover {
 
   readonly #release = (): void => this.#held.clear();
 
-  /** A click or a tap on the floor walks there; visitors who ask for less motion are there at once. */
+  /** A click or tap on the floor walks there; visitors who prefer reduced motion jump there at once. */
   readonly #onClick = ({ clientX, clientY }: MouseEvent): void => {
     const walker = this.#walker;
     if (walker === undefined) return;
@@ -271,7 +271,7 @@ export class WalkController implements ReactiveController, Mover {
     this.#gamepads = view.requestAnimationFrame(poll);
   };
 
-  /** What the joystick and the gamepads ask for. */
+  /** Input of the joystick and the gamepads. */
   #stick(): readonly [right: number, forward: number, turn: number] {
     const pads = this.#gamepads === 0 ? [] : this.#host.ownerDocument.defaultView!.navigator.getGamepads();
     const beyond = (value = 0): number => (Math.abs(value) > DEAD_ZONE ? value : 0);
@@ -285,7 +285,7 @@ export class WalkController implements ReactiveController, Mover {
     return [right, forward, turn];
   }
 
-  /** What the attributes say, in meters. */
+  /** Settings of the attributes, in meters. */
   #settings(): { walkMap: string; eyeHeight: number; unit: number | undefined } {
     const { walkMap, eyeHeight, unit } = this.#of.attributes;
     const warn = (sentence: string): void => this.#of.warn(sentence);

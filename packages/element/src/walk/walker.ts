@@ -1,12 +1,12 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { floorAt, stepOn, wayTo, type WalkMap } from '@gaussian-splat/formats/walk';
 
-/** Walking speed, meters in a second. */
+/** Walking speed, meters per second. */
 const SPEED = 1.4;
 const FAST = 2.5;
 /** Time constant with which the eyes follow steps of the floor, seconds. */
 const EYE_SECONDS = 0.08;
-/** A place of a path is reached at this distance, meters. */
+/** Waypoints closer than this count as reached, meters. */
 const REACHED = 0.05;
 
 type Place = readonly [x: number, y: number, z: number];
@@ -15,7 +15,7 @@ type Place = readonly [x: number, y: number, z: number];
 export class Walker {
   readonly map: WalkMap;
   #at: Place;
-  /** Height of the floor that the eyes have reached. */
+  /** Smoothed height of the floor under the eyes. */
   #eyeFloor: number;
   #path: readonly Place[] = [];
   #isBlocked = false;
@@ -27,12 +27,12 @@ export class Walker {
     this.#eyeFloor = this.#at[1];
   }
 
-  /** Where the feet are. */
+  /** Position of the feet. */
   get at(): Place {
     return this.#at;
   }
 
-  /** Height of the floor as the eyes feel it, which follows steps smoothly. */
+  /** Height of the floor for the eyes, which follows steps smoothly. */
   get eyeFloor(): number {
     return this.#eyeFloor;
   }
@@ -48,7 +48,7 @@ export class Walker {
   }
 
   /**
-   * Sets out for a place on the floor.
+   * Starts walking to a place on the floor.
    * @returns whether there is a way
    */
   goTo(to: Vector3): boolean {
@@ -57,7 +57,7 @@ export class Walker {
     return this.#path.length > 0;
   }
 
-  /** Is at the end of its path at once. */
+  /** Jumps to the end of its path. */
   jump(): void {
     const end = this.#path.at(-1);
     this.#path = [];

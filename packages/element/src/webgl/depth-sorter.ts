@@ -2,13 +2,13 @@ import { DATA_WIDTH, SplatOrder, type OrderView } from '@gaussian-splat/renderer
 import type { PageMessage, WorkerMessage } from '../loading/protocol.js';
 import type { SortAnswer, SortRequest } from '../loading/sort-splats.js';
 
-/** How long an order may be waited for, ms: a worker that has not begun by then may never do. */
+/** Maximum wait for an order, ms: a worker that has not started by then may never start. */
 const LATE_MS = 2_000;
 
 /** The worker that sorts for all scenes of a page. */
 class SortWorker {
   static #current: SortWorker | undefined;
-  /** Rejects where the page refuses it. */
+  /** Rejects if the page forbids workers. */
   readonly ready: Promise<Worker>;
   readonly #spawn: () => Worker;
   #worker: Worker | undefined;
@@ -48,48 +48,48 @@ class SortWorker {
   }
 }
 
-/** A view, and when its order was asked for, by the page's clock. */
+/** A view, and the time of its request, by the page's clock. */
 interface Asked {
   readonly view: OrderView;
   readonly askedAt: number;
 }
 
-/** An order, and the view that it is of. */
+/** An order, and the view that it was sorted for. */
 export interface SortedSplats extends Asked {
-  /** Numbers of splats from near to far, in whole rows of `DATA_WIDTH`. */
+  /** Indices of splats from near to far, in complete rows of `DATA_WIDTH`. */
   readonly order: Uint32Array;
   readonly count: number;
-  /** How often the splats cover the image. */
+  /** Average number of splats per pixel. */
   readonly covered: number;
 }
 
 export interface DepthSorterOptions {
   /** [N, 3] relative to the scene's origin */
   readonly positions: Float32Array;
-  /** Of their largest sections; [N] */
+  /** Areas of the splats' largest cross-sections; [N] */
   readonly areas?: Float32Array | undefined;
   readonly spawn: () => Worker;
-  /** Gets each order as it comes; its buffer is only lent. */
+  /** Receives each order; its buffer is reused afterwards. */
   readonly onOrder: (sorted: SortedSplats) => void;
 }
 
 /**
- * Has a worker sort splats, one view at a time: of those that are asked for meanwhile the latest is next. Where the page refuses the worker, or that does not
- * answer, the page's own thread sorts.
+ * Sorts splats in a worker, one view at a time; the latest request made meanwhile is next. If the page forbids the
+ * worker, or it does not answer, the main thread sorts.
  */
 export class DepthSorter {
   readonly #options: DepthSorterOptions;
   readonly #worker: SortWorker;
   #port: MessagePort | undefined;
   #here: SplatOrder | undefined;
-  /** Lent to the worker while it sorts. */
+  /** Transferred to the worker while it sorts. */
   #buffer: Uint32Array<ArrayBuffer>;
   #sorting: Asked | undefined;
   #next: Asked | undefined;
   #isHere = false;
   #isOver = false;
   readonly #late: ReturnType<typeof setTimeout>;
-  /** What the last order took the worker. */
+  /** Duration of the worker's last sort. */
   milliseconds = Infinity;
 
   constructor(options: DepthSorterOptions) {
@@ -109,7 +109,7 @@ export class DepthSorter {
   /** The order of a view, at once. */
   sortNow(view: OrderView): SortedSplats {
     const here = (this.#here ??= new SplatOrder(this.#options.positions, this.#options.areas));
-    // Its own buffer may be away.
+    // The buffer may be with the worker.
     const order = this.#buffer.length > 0 ? this.#buffer : this.#makeBuffer();
     const askedAt = performance.now();
     const count = here.sort(view, order);
@@ -144,7 +144,7 @@ export class DepthSorter {
     const next = this.#next;
     if (next === undefined || this.#sorting !== undefined) return;
     if (this.#isHere) return void setTimeout(this.#sortHere);
-    // It comes, or is given up.
+    // The request is already sent, or the worker is abandoned.
     if (this.#port === undefined) return;
     this.#next = undefined;
     this.#sorting = next;
@@ -170,7 +170,7 @@ export class DepthSorter {
     if (next !== undefined) this.#options.onOrder(this.sortNow(next.view));
   };
 
-  /** No worker answers: the page's thread sorts from now on. */
+  /** No worker answers, so the main thread sorts from now on. */
   readonly #giveUp = (): void => {
     if (this.#isOver || this.#isHere) return;
     this.#isHere = true;

@@ -20,7 +20,7 @@ export class GlLoaded extends LoadedGaussians {
   readonly textures: GlGaussians;
   /** [N, 3] relative to the scene's origin */
   readonly positions: Float32Array;
-  /** Of their largest sections; [N] */
+  /** Areas of the splats' largest cross-sections; [N] */
   readonly areas: Float32Array;
   readonly spawn: () => Worker;
 

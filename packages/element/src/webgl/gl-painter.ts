@@ -13,12 +13,15 @@ import { DepthSorter, type SortedSplats } from './depth-sorter.js';
 import type { GlLoaded } from './gl-loaded.js';
 import { cannotShow } from './gl-session.js';
 
-/** An order that is older when it is drawn, ms, is made anew on the page's thread, where that is known to take no longer than the second. */
+/**
+ * An order older than this when drawn, ms, is sorted again on the main thread if that takes no longer than the second
+ * value.
+ */
 const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
-/** Of what a whole frame takes, the share that its pixels surely do. */
+/** Minimum fraction of a full frame's time that is proportional to pixels. */
 const SURE_SHARE = 0.5;
 
-/** A canvas that shows copies of what the page's context draws. */
+/** A canvas with copies of the images that the page's context draws. */
 interface CopySurface extends Surface {
   readonly context: CanvasRenderingContext2D;
 }
@@ -28,24 +31,24 @@ export class GlPainter implements Painter {
   readonly filter = undefined;
   readonly isPrepared = true;
   readonly scene: GlLoaded;
-  /** Draws what lies beneath the splats, into the context's canvas. */
+  /** Draws meshes and shadows beneath the splats, into the context's canvas. */
   beneath: ((camera: Camera) => void) | undefined;
   readonly #sorter: DepthSorter;
   readonly #overdraw = new OverdrawLimit();
-  /** The view that the order on the GPU is of. */
+  /** The view of the order on the GPU. */
   #sorted: OrderView | undefined;
-  /** When it was asked for, by the page's clock. */
+  /** Time of the order's request, by the page's clock. */
   #sortedAt = 0;
-  /** The view that was asked for last. */
+  /** The view of the last request. */
   #asked: OrderView | undefined;
-  /** The first order is there. */
+  /** Fulfills when the first order has arrived. */
   readonly #ordered: Promise<void>;
   /** A frame was asked for before there was an order to draw it in. */
   #isOwed = false;
   /** The first frame is drawn. */
   readonly #shown: Promise<void>;
   #tellShown: () => void = () => undefined;
-  /** What a whole frame takes, as far as is known, ms. */
+  /** Time of a full frame as far as known, ms. */
   #wholeMs = 0;
   #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
   #isDestroyed = false;
@@ -59,7 +62,7 @@ export class GlPainter implements Painter {
     this.#sorter = new DepthSorter({
       ...{ positions, areas, spawn },
       onOrder: (sorted) => {
-        // Who waits for the first order draws it.
+        // A caller that waits for the first order draws it.
         const isDue = this.#isOwed || this.#sorted !== undefined;
         this.#isOwed = false;
         this.#setOrder(sorted);
@@ -116,7 +119,7 @@ export class GlPainter implements Painter {
     if (this.isLost) return;
     const view = this.#viewOf(frame);
     if (this.#sorted === undefined || !isSameView(view, this.#sorted)) {
-      // Who reads the picture at once cannot wait for the worker.
+      // Code that reads the image at once cannot wait for the worker.
       if (frame.isRead || this.#isOld) {
         this.#asked = view;
         this.#setOrder(this.#sorter.sortNow(view));
@@ -182,7 +185,7 @@ export class GlPainter implements Painter {
   }
 
   #setOrder({ view, order, count, covered, askedAt }: SortedSplats): void {
-    // What was sorted at once meanwhile is newer.
+    // An order that was sorted synchronously meanwhile is newer.
     if (this.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
     this.#sorted = view;
     this.#sortedAt = askedAt;
@@ -204,7 +207,7 @@ export class GlPainter implements Painter {
     });
   }
 
-  /** Copies what was painted to the element's canvas. */
+  /** Copies the painted image to the element's canvas. */
   #show({ camera, background, surface }: CanvasFrame): void {
     const { width, height } = camera;
     const { context } = surface as CopySurface;
@@ -218,7 +221,7 @@ export class GlPainter implements Painter {
       this.scene.frames.present(undefined, { keeps: true });
     } else this.scene.frames.present(background);
     const { canvas } = lease.gl;
-    // WebGL counts rows from below, so that is where a smaller image lies.
+    // WebGL counts rows from the bottom, so a smaller image lies there.
     context.globalCompositeOperation = 'copy';
     context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
     this.#tellShown();

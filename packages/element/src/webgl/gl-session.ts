@@ -1,11 +1,14 @@
-/** One WebGL context for all elements of a page: browsers end the oldest of more than 8 or 16. Elements show copies of what it draws. */
+/**
+ * One WebGL context for all elements of a page, because browsers drop the oldest of more than 8 or 16. Elements show
+ * copies of its image.
+ */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
 import type { Place } from '../gpu/painter.js';
 import type { DeviceLease } from '../gpu/shared-device.js';
 
-/** A share in the page's context. Whoever asks it for a device of WebGPU gets an error by name. */
+/** A lease of the page's context. Its `device` throws a descriptive error, because there is no WebGPU device. */
 export interface GlLease extends DeviceLease {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
@@ -21,7 +24,7 @@ class GlSession {
   readonly limits: Place['limits'];
   readonly memory: MemoryLedger;
   isLost = false;
-  /** Whom a loss is told. Not by one promise for all: it would hold on to everybody who ever waited for it. */
+  /** Listeners of a loss. A shared promise would retain every listener that ever waited for it. */
   readonly #listeners = new Set<() => void>();
   #users = 0;
 
@@ -85,7 +88,7 @@ class GlSession {
 
 let current: GlSession | undefined;
 
-/** A share in the page's context; undefined where the browser gives none. */
+/** A lease of the page's context; undefined if the browser gives none. */
 export function acquireGl(): GlLease | undefined {
   current ??= start();
   return current?.lease();
@@ -94,7 +97,7 @@ export function acquireGl(): GlLease | undefined {
 function start(): GlSession | undefined {
   const gl = document.createElement('canvas').getContext('webgl2', {
     alpha: true,
-    // What a headset shows cannot be drawn on another GPU.
+    // A headset's image cannot be drawn on another GPU.
     xrCompatible: document.querySelector('gaussian-splat:is([vr],[ar])') !== null,
     antialias: false,
     depth: false,
@@ -104,7 +107,7 @@ function start(): GlSession | undefined {
   return gl && !gl.isContextLost() ? new GlSession(gl) : undefined;
 }
 
-/** What WebGL cannot show. @param cause why there is no WebGPU */
+/** Error for a feature that WebGL lacks. @param cause reason that WebGPU is not used */
 export const cannotShow = (what: string, cause?: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/webgl', {
     where: 'this page, which draws with WebGL 2 in place of WebGPU',
@@ -114,7 +117,7 @@ export const cannotShow = (what: string, cause?: unknown): GaussianSplatError =>
     cause,
   });
 
-/** Of a page that asks for WebGL by name. */
+/** Error for a page that requests WebGL explicitly. */
 export const noWebGl = (): GaussianSplatError =>
   new GaussianSplatError('unsupported/webgl', {
     where: 'this browser',

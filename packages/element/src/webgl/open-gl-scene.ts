@@ -1,4 +1,4 @@
-/** Loaded only where a page has no WebGPU, or asks for WebGL by name. */
+/** Loaded for pages without WebGPU, or with `renderer="webgl"`. */
 import { faultsOf } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
@@ -8,20 +8,21 @@ import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
 import { GlLoaded } from './gl-loaded.js';
 import { acquireGl, cannotShow, noWebGl, type GlLease } from './gl-session.js';
 
-/** What a picture has besides the element's own scene. */
+/** Children that add to the element's own scene. */
 const CHILDREN = 'splat-scene, splat-mesh';
 
 /**
  * Opens a scene file with WebGL 2.
- * @param reason why there is no WebGPU; undefined where it was not asked for
- * @throws GaussianSplatError the reason where there is no WebGL 2, either; `unsupported/webgl` for what it cannot show; as the loading of scenes does; or the signal's reason
+ * @param reason why there is no WebGPU; undefined if it was not requested
+ * @throws GaussianSplatError `reason` without WebGL 2; `unsupported/webgl` for features that it lacks; errors of
+ * loading; or the signal's reason
  */
 export async function openGlScene(
   asked: SceneRequest,
   options: OpenOptions,
   reason: unknown,
 ): Promise<LoadedGaussians> {
-  // Levels of detail are for WebGPU alone: the finest one is the scene, and of a streamed one as much as fits.
+  // Levels of detail need WebGPU: here the finest level is drawn, and for streamed scenes as much as fits.
   const { memoryBudget = Infinity } = options;
   const streamBytes = isStreamed(asked) ? Math.min(memoryBudget, streamCaps().bytes) : undefined;
   const request = { ...asked, levels: false, streamBytes };
@@ -60,7 +61,7 @@ const openOptions = (
   signal: AbortSignal,
 ): Parameters<typeof GlLoaded.open>[2] => ({ memoryBudget, spawn, signal });
 
-/** Shows the previews of one load, one at a time; those that come meanwhile are passed over. */
+/** Shows the previews of one load, one at a time; those that arrive meanwhile are skipped. */
 class Previews {
   readonly #options: OpenOptions;
   readonly #over = new AbortController();
@@ -86,7 +87,7 @@ class Previews {
     try {
       this.#options.onPreview?.(await GlLoaded.open(lease, preview, openOptions(this.#options, signal)));
     } catch {
-      // What keeps a preview from the GPU keeps the whole scene from it, too, and that load says so.
+      // A failure to upload a preview also fails the complete scene, which reports it.
       lease.release();
     } finally {
       this.#isBusy = false;

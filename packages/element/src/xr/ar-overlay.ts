@@ -31,7 +31,7 @@ export const AR_STYLES = css`
   }
 `;
 
-/** What lies over the room on a phone: a button to leave, and the author's prompt until the object stands. */
+/** Overlay of an AR session on a phone: an exit button, and the author's prompt until the object is placed. */
 export class ArOverlay {
   readonly root: HTMLElement;
   readonly #stage: XrHost;
@@ -50,7 +50,7 @@ export class ArOverlay {
     this.#exit.setAttribute('part', 'exit-ar-button');
     slot.append(this.#exit);
     slot.addEventListener('click', () => this.onExit());
-    // A touch of the button moves no object.
+    // A touch of the button must not move the object.
     this.root.addEventListener('beforexrselect', (event) => {
       if (event.composedPath().includes(slot)) event.preventDefault();
     });

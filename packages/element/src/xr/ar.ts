@@ -15,28 +15,28 @@ import type { XrFrame, XrHit, XrAnchor, XrHitTestSource, XrInput, XrPose } from 
 import { XrOffer, type XrKind, type XrStarted } from './xr-offer.js';
 import type { XrGuide } from './xr-session.js';
 
-/** Sizes between which an object is at first, meters. */
+/** Range of an object's initial size, meters. */
 const [SMALLEST, LARGEST] = [0.5, 1];
-/** Scales that fingers reach. */
+/** Range of scales for gestures. */
 const [LEAST_SCALE, MOST_SCALE] = [0.05, 20];
-/** Near true size it stays there. */
+/** Scales this close to true size snap to it. */
 const SNAP = 0.05;
-/** How far under the middle of the view the floor is looked for, radians. */
+/** Downward angle of the ray that searches for the floor, from the center of the view, radians. */
 const DOWN = (20 * Math.PI) / 180;
-/** Of the subject's splats, the share that lies below the floor. */
+/** Fraction of the subject's splats that may lie below the floor. */
 const BELOW = 0.01;
 
-/** Where the subject of a scene stands on its floor. */
+/** The subject's footprint on the floor. */
 interface Footprint {
-  /** Middle of its base, viewer space, units. */
+  /** Center of its base, viewer space, units. */
   readonly base: Vector3;
   readonly height: number;
   readonly radius: number;
-  /** Splats that are not of it are left out: positions, with NaN for those. */
+  /** Positions, with NaN for splats outside the subject. */
   readonly positions: Float32Array;
 }
 
-/** The subject among splats: what lies within the ball that framing has found, but for the lowest hundredth. */
+/** Footprint of the subject: splats within the sphere that framing has found, without the lowest hundredth. */
 export function footprintOf(stage: XrHost, positions: Float32Array, origin: Vector3): Footprint {
   const { center, radius } = stage.camera.bounds;
   const { frame } = stage;
@@ -55,7 +55,7 @@ export function footprintOf(stage: XrHost, positions: Float32Array, origin: Vect
   return { base: [x, low, z], height: high - low, radius, positions: kept };
 }
 
-/** Offers AR: WebXR where there is some, else the author's model on iPhones. */
+/** Offers AR: WebXR if available, else the author's model on iPhones. */
 export function offerAr(element: ReactiveControllerHost & HTMLElement, stage: XrHost, place: HTMLElement): XrOffer {
   adoptStyles(element.shadowRoot!, AR_STYLES);
   const overlay = new ArOverlay(element, stage);
@@ -77,7 +77,7 @@ const arKind = (stage: XrHost, overlay: ArOverlay): XrKind => ({
   guide: (started) => new ArGuide(stage, started, overlay),
 });
 
-/** Puts the subject where the view meets a surface of the room, and lets fingers move, turn and scale it. */
+/** Places the subject at the hit point of the view ray with the room, and lets gestures move, turn and scale it. */
 class ArGuide implements XrGuide {
   readonly background = [0, 0, 0, 0] as const;
   readonly #stage: XrHost;
@@ -139,7 +139,7 @@ class ArGuide implements XrGuide {
     splats.draw(camera, at, placeOf(this.#at, half * this.#scale * this.#unit, this.#turn));
   }
 
-  /** The same shadow as in the page, of the subject alone. */
+  /** The same shadow as in the page, for the subject alone. */
   async #castShadow({ renderer }: XrScene, { positions, radius }: Footprint): Promise<void> {
     const { gl, signal } = this.#of;
     const { camera, frame, services, attributes } = this.#stage;
@@ -183,7 +183,7 @@ class ArGuide implements XrGuide {
     else this.#source = source;
   }
 
-  /** The first surface that the view meets. */
+  /** First surface hit by the view ray. */
   #look(frame: XrFrame, pose: XrPose): void {
     const [hit] = (this.#source && frame.getHitTestResults?.(this.#source)) ?? [];
     const at = hit?.getPose(this.#of.space)?.transform;
@@ -192,7 +192,7 @@ class ArGuide implements XrGuide {
     this.#at = [x, y, z];
     const viewer = pose.transform.position;
     const [towardX, towardZ] = this.#isWall ? [at.matrix[4], at.matrix[6]] : [viewer.x - x, viewer.z - z];
-    // Its front, the side of +z, to the person or away from the wall.
+    // Turns its front, +z, to the person, or away from the wall.
     this.#turn = Math.atan2(towardX, towardZ);
     this.#source?.cancel();
     this.#source = undefined;
@@ -207,7 +207,7 @@ class ArGuide implements XrGuide {
     this.#isAnchored = anchor !== undefined;
   }
 
-  /** The room is known better from frame to frame. */
+  /** Tracking of the room improves over time. */
   #follow(frame: XrFrame): void {
     if (!this.#isAnchored || !this.#anchor) return;
     const place = frame.getPose(this.#anchor.anchorSpace, this.#of.space)?.transform.position;
@@ -243,7 +243,7 @@ class ArGuide implements XrGuide {
     const size = this.#scale;
     const [sin, cos] = [size * Math.sin(this.#turn), size * Math.cos(this.#turn)];
     const meters = metersOf(this.#stage.frame, this.#unit);
-    // The middle of its base is put there; on a wall, of its back.
+    // The center of its base is placed there; on a wall, the center of its back.
     const [lift, back] = this.#isWall ? [height / 2, -radius] : [0, 0];
     const [px, py, pz] = [base[0], base[1] + lift, base[2] + back].map((value) => value * this.#unit);
     const turn = [cos, 0, sin, x, 0, size, 0, y, -sin, 0, cos, z, 0, 0, 0, 1];

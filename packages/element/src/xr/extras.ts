@@ -1,4 +1,4 @@
-/** Loaded where an element has one of the attributes `vr`, `ar`, `measure` and `shadow-intensity`. */
+/** Code for the attributes `vr`, `ar`, `measure` and `shadow-intensity`, loaded if one of them is set. */
 import { css, type ReactiveControllerHost } from 'lit';
 import { Lazy } from '../lazy.js';
 import type { ShadowHost } from '../shadow/shadow-controller.js';

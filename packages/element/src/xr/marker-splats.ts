@@ -4,14 +4,17 @@ import type { SceneLoader } from '../loading/scene-loader.js';
 import { packSplats, type SplatRow } from '../shadow/splat-file.js';
 import type { XrRectangle } from './xr-session.js';
 
-/** Splats of the ring, its radius in meters, and how thick it is. */
+/** Number of splats of the ring, its radius in meters, and its thickness. */
 const [RING_SPLATS, RING_RADIUS, RING_SIGMA] = [48, 0.25, 0.012];
 
-/** A few splats of the element's own: a ring where a teleport goes, or the shadow under an object. No mesh is drawn for either. */
+/**
+ * A few splats made by the element: a ring at the destination of a teleport, or the shadow under an object. Neither
+ * needs a mesh.
+ */
 export class MarkerSplats {
   #renderer: GlRenderer | undefined;
 
-  /** @param rows all in one plane, for which any order shows the same */
+  /** @param rows all in one plane, so that their order does not matter */
   constructor(gl: WebGL2RenderingContext, rows: readonly SplatRow[], loader: SceneLoader, signal: AbortSignal) {
     this.#load(gl, rows, loader, signal).catch(() => undefined);
   }
@@ -40,7 +43,7 @@ export class MarkerSplats {
     this.#renderer = renderer;
   }
 
-  /** Draws them over what is there. @param toWorld from their own frame to the camera's world */
+  /** Draws the markers over the current image. @param toWorld from their own frame to the camera's world */
   draw(camera: Camera, target: XrRectangle, toWorld: Matrix4): void {
     const renderer = this.#renderer;
     if (!renderer) return;
@@ -50,7 +53,7 @@ export class MarkerSplats {
   }
 }
 
-/** Where markers stand: their middle, meters, y up; how large they are, and how far they are turned about y, radians. */
+/** Transform of markers: center in meters, y up; size; and angle about y, radians. */
 export const placeOf = ([x, y, z]: Vector3, size = 1, turn = 0): Matrix4 => {
   const [sin, cos] = [size * Math.sin(turn), size * Math.cos(turn)];
   return [cos, 0, sin, x, 0, size, 0, y, -sin, 0, cos, z, 0, 0, 0, 1];

@@ -47,12 +47,12 @@ const STYLES = css`
   }
 `;
 const SVG = 'http://www.w3.org/2000/svg';
-/** A pointer that moves farther between its press and its release drags, CSS pixels. */
+/** Minimum distance between press and release of a drag, CSS pixels. */
 const DRAG = 5;
-/** Digits of a length. */
+/** Significant digits of a length. */
 const DIGITS = 3;
 
-/** A ruler: two ends on surfaces of the scene, a line, and its length with what it may be off by. */
+/** A ruler: two ends on surfaces of the scene, a line, and its length with its uncertainty. */
 export class Measure implements ReactiveController {
   readonly #element: ReactiveControllerHost & HTMLElement;
   readonly #stage: XrHost;
@@ -127,7 +127,7 @@ export class Measure implements ReactiveController {
     observer.observe(surface);
     signal.addEventListener('abort', () => observer.disconnect());
     surface.after(this.#drawing, this.#label);
-    // By keyboard the ends are set in the middle of the picture: that has the focus then.
+    // The ends are set in the center of the image when using a keyboard, so that gets the focus.
     this.#hasKeyboard = this.#button.matches(':focus-visible');
     if (surface.tabIndex < 0) {
       surface.tabIndex = 0;
@@ -185,7 +185,7 @@ export class Measure implements ReactiveController {
     const point = await this.#stage.positionFromPoint(clientX, clientY);
     if (!signal || signal.aborted) return;
     if (point === null) return this.#say(this.#word('measure-none'));
-    // A third end begins anew.
+    // A third point starts a new measurement.
     this.#ends = this.#ends.length === 1 ? [this.#ends[0], point] : [point];
     this.#draw();
     const measured = this.#measured();
@@ -203,7 +203,7 @@ export class Measure implements ReactiveController {
     return { from, to, length, uncertainty, meters: unit === undefined ? null : length * unit, unit: unit ?? null };
   }
 
-  /** Draws the ruler where its ends lie in the last frame. */
+  /** Draws the ruler at its ends' positions in the last frame. */
   readonly #draw = (): void => {
     const { drawnFrom: camera, surface, frame } = this.#stage;
     this.#drawing.replaceChildren();
@@ -234,7 +234,7 @@ export class Measure implements ReactiveController {
   }
 }
 
-/** `1.24 m ± 0.01 m`, both with as many decimals; without a unit of the file, numbers alone. */
+/** `1.24 m ± 0.01 m`, both with as many decimals; plain numbers if the file has no unit. */
 function textOf({ length, uncertainty, unit }: MeasureDetail): string {
   const factor = unit ?? 1;
   const suffix = unit === null ? '' : ' m';

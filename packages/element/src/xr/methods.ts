@@ -1,6 +1,9 @@
-/** What elements have besides while they have `vr` or `ar`: present once their code is. */
+/** Methods of elements with `vr` or `ar`, present once their code has loaded. */
 export interface ImmersiveMethods {
-  /** Starts VR, as a click on its button does: call it in the handler of a click, with nothing awaited before it. Rejects with GaussianSplatError `unsupported/xr`, `argument/activation`. */
+  /**
+   * Starts VR, like a click on its button: call it in a click handler, without an earlier await. Rejects with
+   * GaussianSplatError `unsupported/xr`, `argument/activation`.
+   */
   activateVR?(): Promise<void>;
   /** The same for AR. */
   activateAR?(): Promise<void>;

@@ -12,11 +12,11 @@ import type { XrScene } from './xr-scene.js';
 
 /** A sort that takes longer, ms, is left to a worker, in an order that turning the head does not change. */
 const QUICK_SORT_MS = 8;
-/** Weight of the last sort in the mean of their times. */
+/** Weight of the last sort in the moving average of sort times. */
 const SMOOTHING = 0.2;
-/** Eyes whose axes differ by less look the same way: the sine of the angle. */
+/** Eyes whose axes differ by less than this look in the same direction: sine of the angle. */
 const PARALLEL = 1e-4;
-/** The head moves so far, in parts of its distance from the middle of the scene, before a worker sorts again. */
+/** Head movement, as a fraction of its distance from the center of the scene, after which a worker sorts again. */
 const MOVED = 0.002;
 
 /** Keeps the splats of a session in order: one order for all views of a frame. */
@@ -63,7 +63,7 @@ export class ViewOrder {
   }
 
   #sortNow(view: OrderView): void {
-    // The first sort runs code that is not compiled yet: its time says nothing.
+    // The first sort includes compilation, so its time does not count.
     if (this.#sorted === undefined) this.#sorter.sort(view, this.#order);
     const begin = performance.now();
     const count = this.#sorter.sort(view, this.#order);

@@ -3,20 +3,20 @@ import { floorAt, type WalkMap } from '@gaussian-splat/formats/walk';
 import { Walker } from '../walk/walker.js';
 import type { XrFrame, XrInput, XrPose, XrSpace } from './webxr.js';
 
-/** Height of the eyes above the floor where none is known, meters. */
+/** Assumed height of the eyes above the floor, meters. */
 const EYE_HEIGHT = 1.6;
-/** A turn of the stick, radians. */
+/** Angle of a turn by the stick, radians. */
 const TURN = Math.PI / 6;
-/** Deflection of a stick that counts as none, and that turns. */
+/** Deflection of a stick below which it is ignored, and above which it turns. */
 const [DEAD_ZONE, TURN_ZONE] = [0.2, 0.7];
 /** Buttons of a controller, as `xr-standard` numbers them. */
 const [TRIGGER, LEAVE] = [0, 5];
-/** How long the button that leaves is held, seconds. */
+/** Time that the exit button must be held, seconds. */
 const LEAVE_SECONDS = 1;
-/** As far as a teleport goes, and how its ray is followed, meters. */
+/** Maximum distance of a teleport, and step size along its ray, meters. */
 const [REACH, RAY_STEP] = [12, 0.05];
 
-/** What of a stick or a button was held in the frame before. */
+/** State of a stick and of buttons in the previous frame. */
 interface Held {
   turn: boolean;
   trigger: boolean;
@@ -24,29 +24,29 @@ interface Held {
 }
 
 export interface VrStart {
-  /** Of the camera, meters, viewer space. */
+  /** Position of the camera's eye, meters, viewer space. */
   readonly eye: Vector3;
-  /** To which it looks, around the vertical axis, radians. */
+  /** Viewing direction around the vertical axis, radians. */
   readonly heading: number;
-  /** The scene's frame to viewer space, with the unit's length: rows. */
+  /** The scene's frame to viewer space, scaled to meters, row-major. */
   readonly toViewer: Float64Array;
-  /** Whether the space's origin is on the floor, or at the eyes. */
+  /** Whether the space's origin is on the floor instead of at the eyes. */
   readonly isFloor: boolean;
-  /** Smooth walking is not wanted. */
+  /** Smooth locomotion is off. */
   readonly stepsOnly: boolean;
 }
 
-/** Where a person in a headset stands in the scene: turns by steps, walks on the floor, and jumps to a place that is aimed at. */
+/** Pose of a headset's user in the scene: snap turns, walking on the floor, and teleports. */
 export class VrRig {
   readonly #start: VrStart;
   readonly #onLeave: () => void;
   readonly #held = new Map<string, Held>();
   #heading: number;
-  /** Of the space's origin, viewer space, meters; undefined before the first pose. */
+  /** Position of the space's origin, viewer space, meters; undefined before the first pose. */
   #origin: Vector3 | undefined;
   #map: WalkMap | undefined;
   #walker: Walker | undefined;
-  /** Where a teleport would go now. */
+  /** Destination of a teleport while aiming. */
   target: Vector3 | undefined;
 
   constructor(start: VrStart, onLeave: () => void) {
@@ -55,7 +55,7 @@ export class VrRig {
     this.#heading = start.heading;
   }
 
-  /** The floor is known now. */
+  /** Sets the floor once it is loaded. */
   set map(map: WalkMap) {
     this.#map = map;
     if (this.#origin) this.#walker = new Walker(map, this.#start.eye);
@@ -63,7 +63,7 @@ export class VrRig {
       this.#origin = [this.#origin[0], this.#floorY(this.#walker.at[1]), this.#origin[2]];
   }
 
-  /** Moves on to a frame. @returns the scene's frame to the space, row-major */
+  /** Advances to a frame. @returns the scene's frame to the space, row-major */
   place(frame: XrFrame, pose: XrPose, space: XrSpace, seconds: number): Float64Array {
     const { x, z } = pose.transform.position;
     this.#origin ??= this.#begin(x, z);
@@ -72,7 +72,7 @@ export class VrRig {
     return this.#matrix();
   }
 
-  /** The same in the space of the session. */
+  /** The destination in the session's space. */
   get targetInSpace(): Vector3 | undefined {
     if (!this.target) return undefined;
     const [x, y, z] = [0, 1, 2].map((k) => this.target![k] - this.#origin![k]);
@@ -94,7 +94,7 @@ export class VrRig {
     return this.#start.isFloor ? floor : floor + EYE_HEIGHT;
   }
 
-  /** A direction of the space, in viewer space. */
+  /** Direction from the session's space to viewer space. */
   #turned([x, y, z]: Vector3): Vector3 {
     const [sin, cos] = [Math.sin(this.#heading), Math.cos(this.#heading)];
     return [cos * x + sin * z, y, -sin * x + cos * z];
@@ -124,13 +124,13 @@ export class VrRig {
     }
   }
 
-  /** Where the head is above, viewer space. */
+  /** Position of the head, viewer space. */
   #headAt({ transform: { position } }: XrPose): Vector3 {
     const head = this.#turned([position.x, position.y, position.z]);
     return [0, 1, 2].map((k) => this.#origin![k] + head[k]) as unknown as Vector3;
   }
 
-  /** Steps turn around the head. */
+  /** Snap turns rotate around the head. */
   #turnBy(x: number, pose: XrPose, held: Held): void {
     const isTurning = Math.abs(x) > TURN_ZONE;
     if (isTurning && !held.turn) {
@@ -142,7 +142,7 @@ export class VrRig {
     held.turn = isTurning;
   }
 
-  /** Along the floor, in the direction that the head looks to. */
+  /** Motion along the floor in the direction of the head. */
   #walk(x: number, y: number, pose: XrPose, seconds: number): void {
     if (this.#start.stepsOnly || Math.hypot(x, y) < DEAD_ZONE || seconds === 0) return;
     const m = pose.transform.matrix;
@@ -163,7 +163,7 @@ export class VrRig {
     this.#origin = [origin[0] + at[0] - before[0], this.#floorY(eyeFloor), origin[2] + at[2] - before[2]];
   }
 
-  /** Held, the trigger aims; let go, it jumps. */
+  /** Holding the trigger aims; releasing it teleports. */
   #aim(frame: XrFrame, space: XrSpace, pose: XrPose, input: XrInput, held: Held): void {
     const isHeld = input.gamepad?.buttons[TRIGGER]?.pressed ?? false;
     const ray = isHeld || held.trigger ? frame.getPose(input.targetRaySpace, space) : undefined;
@@ -180,7 +180,7 @@ export class VrRig {
     if (this.#map) this.#walker = new Walker(this.#map, [to[0], to[1] + EYE_HEIGHT, to[2]]);
   }
 
-  /** Where a ray meets the floor: only there does a person land. */
+  /** Only a ray that meets the floor has a valid destination. */
   #hit({ transform: { matrix: m } }: XrPose): Vector3 | undefined {
     const from = this.#turned([m[12], m[13], m[14]]);
     const way = this.#turned([-m[8], -m[9], -m[10]]);

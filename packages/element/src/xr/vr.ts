@@ -12,7 +12,7 @@ import type { XrGuide } from './xr-session.js';
 
 /** Behind the splats, premultiplied. */
 const BACKGROUND = [0.1, 0.1, 0.11, 1] as const;
-/** A floor that is smaller is none, m². */
+/** Minimum area of a floor, m². */
 const MIN_AREA = 4;
 
 /** The unit of the file, meters. */
@@ -34,7 +34,7 @@ export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
     1,
   ]);
 
-/** Sessions with a headset that shuts out the room. */
+/** Sessions in a headset that does not show the room. */
 export const vrKind = (stage: XrHost): XrKind => ({
   ...{ mode: 'immersive-vr', name: 'vr', word: 'vr' },
   isWanted: () => stage.attributes.vr,

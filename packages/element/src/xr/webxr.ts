@@ -1,4 +1,4 @@
-/** What is used of WebXR, which TypeScript has no types of. */
+/** The part of WebXR in use; TypeScript has no types of it. */
 
 export type XrMode = 'immersive-vr' | 'immersive-ar';
 
@@ -85,6 +85,6 @@ export const xrOf = (view: Window | null): XrSystem | undefined =>
 
 export const makeLayer = (session: XrSession, gl: WebGL2RenderingContext): XrLayer => {
   const { XRWebGLLayer } = globalThis as unknown as { XRWebGLLayer: LayerClass };
-  // Splats are blended in a texture of the renderer's own: samples and depth of the layer would be of no use.
+  // Splats are blended in a texture of the renderer: multisampling and depth of the layer would be unused.
   return new XRWebGLLayer(session, gl, { antialias: false, depth: false, stencil: false, ignoreDepthValues: true });
 };

@@ -10,7 +10,7 @@ import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { SpokenStrings } from '../words.js';
 
-/** What VR, AR and the ruler ask of their element. */
+/** The interface of the element that VR, AR and the ruler use. */
 export interface XrHost {
   readonly element: HTMLElement;
   readonly attributes: Attributes;
@@ -19,7 +19,7 @@ export interface XrHost {
   readonly strings: SpokenStrings;
   readonly frame: ViewerFrame;
   readonly services: { readonly sceneLoader: SceneLoader };
-  /** What the scene on show was asked for by; null while there is none, and for what no file has. */
+  /** The request of the displayed scene; null without one, and for sources without a file. */
   readonly walkable: SceneRequest | null;
   readonly sources: {
     readonly own: { readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean } };
@@ -29,7 +29,7 @@ export interface XrHost {
   readonly isOnShow: boolean;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   readonly drawnFrom: Camera | undefined;
-  /** A session shows the scene: the page does not. */
+  /** A session shows the scene, so the page does not draw it. */
   isImmersed: boolean;
   requestFrame(): void;
   positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null>;

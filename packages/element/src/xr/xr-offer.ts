@@ -9,13 +9,13 @@ import { xrOf, type XrMode, type XrSession, type XrSpace } from './webxr.js';
 
 export type XrStatus = 'not-presenting' | 'session-started' | 'object-placed' | 'failed';
 
-/** What a kind of session is made of. */
+/** Definition of a kind of session. */
 export interface XrKind {
   readonly mode: XrMode;
-  /** Of the attribute, of its button's slot, and of its status. */
+  /** Name of the attribute, of its button's slot, and of its status. */
   readonly name: 'vr' | 'ar';
   readonly word: ExtraWord;
-  /** The page wants it. */
+  /** Whether the page enables it. */
   readonly isWanted: () => boolean;
   /** For `requestSession`; called in the click. */
   options(): object;
@@ -34,7 +34,7 @@ export interface XrStarted {
   readonly offer: XrOffer;
 }
 
-/** A session that runs. */
+/** A running session. */
 interface Running {
   readonly session: XrSession;
   readonly over: AbortController;
@@ -44,7 +44,7 @@ interface Running {
   scene?: XrScene;
 }
 
-/** Offers one kind of session: a button where a session can start, the session itself, and its status. */
+/** Offers one kind of session: a button if sessions are supported, the session itself, and its status. */
 export class XrOffer implements ReactiveController {
   readonly stage: XrHost;
   readonly kind: XrKind;
@@ -68,7 +68,7 @@ export class XrOffer implements ReactiveController {
     this.#button = Object.assign(page.createElement('button'), { type: 'button' });
     this.#button.setAttribute('part', `${kind.name}-button`);
     this.#slot.append(this.#button);
-    // The author's own button in the slot, too.
+    // Also handles the author's button in the slot.
     this.#slot.addEventListener('click', () => {
       this.activate().catch((error: Error) => stage.warn(error.message));
     });
@@ -84,7 +84,7 @@ export class XrOffer implements ReactiveController {
     return this.#running !== undefined;
   }
 
-  /** What draws the session; undefined outside of one. */
+  /** Draws the session; undefined outside one. */
   get loop(): XrLoop | undefined {
     return this.#running?.loop;
   }
@@ -106,7 +106,10 @@ export class XrOffer implements ReactiveController {
     if (this.#running && this.#isOutdated(this.#running)) this.end();
   }
 
-  /** Another source is asked for, which is not loaded out of sight, or the page's own splats, which the session draws, are gone. */
+  /**
+   * The session ends if another source is requested, which does not load out of view, or if the page's splats, which it
+   * draws, are gone.
+   */
   #isOutdated({ context, shown }: Running): boolean {
     const { scene } = this.stage.sources.own;
     return scene.isOutgoing || (context?.isOwn === false && scene.scene !== shown);
@@ -121,8 +124,8 @@ export class XrOffer implements ReactiveController {
   }
 
   /**
-   * Starts a session. Nothing is waited for before the browser is asked: call it in a click.
-   * @throws GaussianSplatError `unsupported/xr` where there is none, `argument/activation` outside of a click
+   * Starts a session. Calls the browser without an earlier await, so call it in a click handler.
+   * @throws GaussianSplatError `unsupported/xr` if it is not available, `argument/activation` outside a click
    */
   activate(): Promise<void> {
     const xr = xrOf(this.#element.ownerDocument.defaultView);
@@ -148,7 +151,7 @@ export class XrOffer implements ReactiveController {
     this.#running?.session.end().catch(() => undefined);
   }
 
-  /** Tells the page, and CSS. */
+  /** Reports the status to the page and to CSS. */
   status(status: XrStatus, reason?: string): void {
     const name = `${this.kind.name}-status` as const;
     this.#element.setAttribute(name, status);

@@ -7,10 +7,13 @@ import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { GlLoaded } from '../webgl/gl-loaded.js';
 
-/** How long a context may take to become one for a headset, ms: browsers without a headset never answer. */
+/** Timeout for making a context compatible with a headset, ms: browsers without a headset never answer. */
 const COMPATIBLE_MS = 2_000;
 
-/** What a session takes of a scene that is streamed elsewhere, bytes: 400,000 splats in headsets and phones, 1.5 million on computers. */
+/**
+ * Memory limit of a streamed scene in a session, bytes: 400,000 splats in headsets and phones, 1.5 million on
+ * computers.
+ */
 const STREAM_BYTES = { handheld: 50e6, computer: 186e6 };
 
 /** A scene that a session draws. */
@@ -22,7 +25,7 @@ export interface XrScene {
   destroy(): void;
 }
 
-/** A context for a session, and whether it is the session's own. */
+/** A context for a session, and whether the session owns it. */
 export interface XrContext {
   readonly gl: WebGL2RenderingContext;
   readonly isOwn: boolean;
@@ -34,7 +37,7 @@ export interface XrSceneSource {
   readonly loader: SceneLoader;
 }
 
-/** The page's context where it draws with WebGL and the headset can show it, else one of the session's own. */
+/** The page's context if it draws with WebGL and is compatible with the headset, else one owned by the session. */
 export async function contextFor(shown: LoadedGaussians | null): Promise<XrContext> {
   if (shown instanceof GlLoaded && !shown.isLost && (await becomesCompatible(shown.lease.gl)))
     return { gl: shown.lease.gl, isOwn: false };
@@ -57,7 +60,7 @@ async function becomesCompatible(gl: WebGL2RenderingContext): Promise<boolean> {
   return Promise.race([made, late]);
 }
 
-/** The scene in a context: the splats on show, or the same file once more, usually from the browser's cache. */
+/** Opens the scene in a context: the displayed splats, or the same file again, usually from the browser's cache. */
 export async function openXrScene(
   { gl, isOwn }: XrContext,
   { shown, request, loader }: XrSceneSource,

@@ -13,35 +13,35 @@ import {
 } from './webxr.js';
 import type { XrContext, XrScene } from './xr-scene.js';
 
-/** Share of the headset's interval that a frame may take on the GPU. */
+/** Fraction of the headset's refresh interval that a frame may take on the GPU. */
 const SHARE_OF_INTERVAL = 0.8;
-/** Frames a second of a headset that does not say. */
+/** Assumed refresh rate of a headset, Hz. */
 const USUAL_RATE = 72;
-/** One frame in this time is measured, ms: what is drawn adapts in seconds, since a head never rests. */
+/** Interval between measured frames, ms: quality adapts within seconds, because a head never rests. */
 const MEASURE_MS = 1_000;
 const LEAST_SCALE = 0.5;
 const SCALE_STEP = 0.85;
 /** Meters. */
 const [NEAR, FAR] = [0.05, 1000];
-/** What is seen while the scene is loading. */
+/** Background while the scene is loading. */
 const GRAY = [0.2, 0.2, 0.21, 1] as const;
 
-/** Who says where the scene is, frame after frame. */
+/** Provides the scene's transform for each frame. */
 export interface XrGuide {
   /** Premultiplied, behind the splats. */
   readonly background: readonly [number, number, number, number];
   /**
-   * Moves on to a frame.
-   * @returns the scene's own frame to the reference space, row-major; null while the scene is nowhere
+   * Advances to a frame.
+   * @returns the scene's own frame to the reference space, row-major; null while the scene has no place
    */
   place(frame: XrFrame, pose: XrPose, seconds: number): Float64Array | null;
-  /** Draws what belongs below the splats of a view: its camera is that of the reference space. */
+  /** Draws below the splats of a view, with the camera in the reference space. */
   drawBelow?(camera: Camera, at: XrRectangle): void;
-  /** Draws what lies over the splats of a view. */
+  /** Draws above the splats of a view. */
   drawAbove?(camera: Camera, at: XrRectangle): void;
 }
 
-/** Where a view is drawn. */
+/** Target rectangle of a view. */
 export interface XrRectangle {
   readonly framebuffer: WebGLFramebuffer | null;
   readonly x: number;
@@ -55,7 +55,7 @@ export interface XrRendering {
   readonly spawn: () => Worker;
 }
 
-/** Draws a scene into a session, by the session's own frames. */
+/** Draws a scene into a session, in the session's animation frames. */
 export class XrLoop {
   readonly #session: XrSession;
   readonly #gl: WebGL2RenderingContext;
@@ -68,7 +68,7 @@ export class XrLoop {
   #isOver = false;
   #last: number | undefined;
   #measuredAt = -Infinity;
-  /** Share of the width and height of a view that is drawn. */
+  /** Fraction of the width and height of a view that is drawn. */
   scale = 1;
   /** Called with each frame that shows the scene. */
   onFrame: () => void = () => undefined;
@@ -83,7 +83,7 @@ export class XrLoop {
     session.requestAnimationFrame(this.#draw);
   }
 
-  /** What a frame may take on the GPU, ms. */
+  /** Time budget of a frame on the GPU, ms. */
   get targetMs(): number {
     return (SHARE_OF_INTERVAL * 1000) / (this.#session.frameRate ?? USUAL_RATE);
   }
@@ -94,12 +94,12 @@ export class XrLoop {
     this.#order = new ViewOrder(scene, rendering.byDistance, rendering.spawn);
   }
 
-  /** What is drawn, once it is there. */
+  /** The drawn scene, once it is loaded. */
   get scene(): XrScene | undefined {
     return this.#scene;
   }
 
-  /** Draws only splats with a position: NaN for the others. */
+  /** Draws only splats whose position is not NaN. */
   crop(positions: Float32Array): void {
     if (!this.#scene || !this.#rendering) return;
     this.#order?.destroy();
@@ -172,7 +172,7 @@ export class XrLoop {
     );
   }
 
-  /** Draws fewer or more pixels from now on. @param milliseconds what a frame took on the GPU, at most */
+  /** Adapts the number of pixels to the measured time. @param milliseconds frame time on the GPU, at most */
   adapt(milliseconds: number): void {
     if (milliseconds > this.targetMs) this.scale = Math.max(LEAST_SCALE, this.scale * SCALE_STEP);
     else if (milliseconds < this.targetMs / 2) this.scale = Math.min(1, this.scale / SCALE_STEP);
