@@ -70,12 +70,12 @@ const ENTRIES = [
 ];
 /** The life cycle of Lit and of the platform is inherited as well, and nobody's concern. */
 const LIFE_CYCLE = [
-  'stage',
+  'core',
   'connectedMoveCallback',
-  'holder',
+  'entry',
   'place',
   'source',
-  'liveValues',
+  'dynamicValues',
   'credentials',
   'hasOwnClock',
   'warn',

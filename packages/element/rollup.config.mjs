@@ -1,7 +1,7 @@
 /**
  * The CDN build: `cdn/gaussian-splat.min.js` (the element and the renderer in one file, for a script tag with an
  * integrity attribute), and beside it the scene worker with a chunk for every reader, which it finds from its own URL.
- * And for bundlers, in the package: the worker as text, a module for each chunk, and as one file (src/loading/own-worker.ts); and the element as
+ * And for bundlers, in the package: the worker as text, a module for each chunk, and as one file (src/loading/worker-sources.ts); and the element as
  * short as for CDNs, for those that build for production.
  */
 import { cpSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
@@ -16,7 +16,7 @@ import { transform } from 'esbuild';
 import { workerAsText } from './scripts/worker-text.mjs';
 
 /** Of the package's own modules these stay as they are: they find files by their own address, are the worker's, or are made here. */
-const KEPT = /\/element\/dist\/(loading\/(own-worker|spawn-worker|scene-worker)|meshes\/three)\.js$/;
+const KEPT = /\/element\/dist\/(loading\/(worker-sources|spawn-worker|scene-worker)|meshes\/three)\.js$/;
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
@@ -72,7 +72,7 @@ const sources = [
       'hands-view',
       'corner-button',
       'views/tour',
-      'live/controls-panel',
+      'dynamic/controls-panel',
       'controllers/hotspot-controller',
       'controllers/motion-controller',
     ].map((name) => path(`./dist/${name}.js`)),
@@ -93,7 +93,7 @@ const plugins = [
 /** Here the worker's script lies beside the element's. */
 const workerBeside = {
   name: 'worker-beside',
-  load: (id) => (id === path('./dist/loading/own-worker.js') ? `export * from './own-worker-cdn.js'` : null),
+  load: (id) => (id === path('./dist/loading/worker-sources.js') ? `export * from './worker-sources-cdn.js'` : null),
 };
 
 /** Chunks are called by what is in them, and most carry a hash: those of earlier builds would pile up. */

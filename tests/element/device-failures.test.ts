@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { unrecoverable } from '../../packages/element/src/gpu/come-back.js';
+import { unrecoverable } from '../../packages/element/src/gpu/device-recovery.js';
 import { DeviceLostError } from '../../packages/element/src/gpu/device-failures.js';
 
 test('a lost device is told of in the words of the browser, and what to do about it', () => {

@@ -7,7 +7,7 @@ import { resolveContract } from '@gaussian-splat/core/contract';
 import { bytesSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { readScene } from '@gaussian-splat/formats';
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
-import { declaredBounds } from '../../packages/element/src/live/open-live-model.js';
+import { declaredBounds } from '../../packages/element/src/dynamic/open-dynamic-model.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { randomSource } from '../support/gpu.js';

@@ -99,7 +99,9 @@ check('names the events of the typed map, with their types, and every one that t
   );
   assert.deepEqual(namesOf(element?.events), [...typed.keys()].sort());
   for (const { name, type } of element?.events ?? []) assert.equal(type?.text, typed.get(name), name);
-  const sources = ['stage.ts', 'source-entry.ts', 'source-list.ts', 'live/live-wiring.ts'].map(source).join('\n');
+  const sources = ['element-core.ts', 'source-entry.ts', 'source-list.ts', 'dynamic/dynamic-wiring.ts']
+    .map(source)
+    .join('\n');
   const dispatched = matches(sources, /new (?:Custom|Progress)?Event\('([a-z-]+)'/g);
   assert.ok(dispatched.length > 5, dispatched.join());
   for (const name of dispatched) assert.ok(typed.has(name), name);
@@ -110,7 +112,7 @@ check('names the slots, parts, custom properties and states that there are', () 
   const late = [
     'views/tour',
     'hands-view',
-    'live/sound',
+    'dynamic/sound',
     'controllers/motion-controller',
     'controllers/hotspot-controller',
   ]
@@ -119,7 +121,7 @@ check('names the slots, parts, custom properties and states that there are', () 
   const [template, styles] = [source('template.ts') + late, source('styles.ts') + late];
   const slots = matches(template, /<slot name="([a-z-]+)"/g);
   assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*', 'sound']));
-  const panelParts = matches(source('live/controls-panel.ts'), /part: '([a-z-]+)'/g);
+  const panelParts = matches(source('dynamic/controls-panel.ts'), /part: '([a-z-]+)'/g);
   assert.ok(panelParts.length > 0);
   const parts = [/part="([a-z-]+)"/g, /'part', '([a-z-]+)'/g, /[bB]utton\(\s*'([a-z-]+)'/g].flatMap((pattern) =>
     matches(template, pattern),
@@ -137,7 +139,7 @@ check('names members that exist, and no private one', () => {
   assert.ok(members.length > 60, `${members.length} members`);
   for (const { name, static: isStatic } of members) {
     assert.ok(isStatic ? name in GaussianSplatElement : name in prototype || reactive.has(name), name);
-    assert.ok(!name.startsWith('#') && name !== 'stage', name);
+    assert.ok(!name.startsWith('#') && name !== 'core', name);
   }
   for (const name of ['play', 'positionFromPoint', 'toBlob', 'cameraOrbit']) {
     assert.ok(

@@ -1,7 +1,7 @@
 /** Rotations of joints, to the formats of poses and back. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { poseOf, turnsOf } from '../../packages/element/src/live/pose-of.js';
+import { poseOf, turnsOf } from '../../packages/element/src/dynamic/pose-of.js';
 
 /** Axis-angle, radians: nothing, little, around each axis, half turns where matrices divide by another number each. */
 const TURNS = [

@@ -4,15 +4,15 @@ import { test } from 'node:test';
 import type { Camera, GaussianSplatError } from '@gaussian-splat/core';
 import type { Contract } from '@gaussian-splat/core/contract';
 import type { GeneratorModel, GeneratorState } from '@gaussian-splat/generator';
-import type { LiveState } from '../../packages/element/src/live/live-model.js';
-import { StateReader } from '../../packages/element/src/live/read-state.js';
+import type { DynamicState } from '../../packages/element/src/dynamic/dynamic-model.js';
+import { StateReader } from '../../packages/element/src/dynamic/read-state.js';
 
 const CAMERA = {} as Camera;
-const STATE: LiveState = { timeSeconds: 0, pose: undefined, controls: {}, pictures: {} };
+const STATE: DynamicState = { timeSeconds: 0, pose: undefined, controls: {}, pictures: {} };
 
 /** Reads states for models with these inputs. */
 function readerOf(...models: Contract['inputs'][]): {
-  read: (state: Partial<LiveState>) => GeneratorState;
+  read: (state: Partial<DynamicState>) => GeneratorState;
   told: string[];
 } {
   const told: string[] = [];
@@ -20,7 +20,7 @@ function readerOf(...models: Contract['inputs'][]): {
     models.map((inputs) => ({ contract: { inputs } }) as unknown as GeneratorModel),
     ({ message }: GaussianSplatError) => told.push(message),
   );
-  const read = (some: Partial<LiveState>): GeneratorState => {
+  const read = (some: Partial<DynamicState>): GeneratorState => {
     const state = { ...STATE, ...some };
     reader.checkPose(state);
     return reader.read(state, CAMERA, {}, []);

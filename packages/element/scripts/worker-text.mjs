@@ -1,4 +1,4 @@
-/** The chunks of the worker's code as modules that export their text, and the list of them: see src/loading/own-worker.ts. */
+/** The chunks of the worker's code as modules that export their text, and the list of them: see src/loading/worker-sources.ts. */
 import { basename } from 'node:path';
 
 /** What a chunk calls for another. No name that the code has: one of its own would be called. */

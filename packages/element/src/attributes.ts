@@ -18,7 +18,7 @@ import {
   type AttributeGrammar,
 } from './camera/grammar.js';
 import type { CameraSettings } from './camera/settings.js';
-import type { Numbers } from './live/values.js';
+import type { Numbers } from './dynamic/values.js';
 import type { SpokenStrings } from './words.js';
 
 /** Limits a delay in ms to the maximum of timers, which treat longer ones, even `Infinity`, as 0. */

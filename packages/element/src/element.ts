@@ -5,17 +5,17 @@ import type { CameraSettings } from './camera/settings.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
-import type { GeneratorInput } from './live/inputs.js';
-import type { LiveState } from './live/live-model.js';
+import type { GeneratorInput } from './dynamic/inputs.js';
+import type { DynamicState } from './dynamic/dynamic-model.js';
 import type { SceneLimits } from './loading/protocol.js';
-import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
-import { Stage } from './stage.js';
-import type { StageHost } from './stage-host.js';
+import { CONTROL_PREFIX, readControls, readNumbers } from './dynamic/values.js';
+import { ElementCore } from './element-core.js';
+import type { ElementHost } from './element-host.js';
 import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
 import { readSpokenStrings, type SpokenStrings } from './words.js';
-import type { SoundProperties } from './live/sound-properties.js';
+import type { SoundProperties } from './dynamic/sound-properties.js';
 import type { ImmersiveMethods } from './xr/methods.js';
 
 /** The properties that move the camera, and the setting of each. */
@@ -159,25 +159,25 @@ export class GaussianSplatElement extends ViewingMethods {
 
   #attributes: Attributes;
   readonly #internals: ElementInternals | null;
-  #liveValues: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
+  #dynamicValues: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
   #strings: SpokenStrings = {};
   /** Camera attributes that the page has set since they were last applied. */
   readonly #set = new Set<keyof CameraSettings>();
   #controlObserver: MutationObserver | undefined;
   readonly #warned = new Set<string>();
   /** @internal */
-  protected readonly stage: Stage;
+  protected readonly core: ElementCore;
 
   constructor() {
     super();
     this.#attributes = this.#readAttributes();
     this.#internals = (!isServer && this.attachInternals?.()) || null;
-    this.stage = new Stage(this, GaussianSplatElement.#hostOf(this));
+    this.core = new ElementCore(this, GaussianSplatElement.#hostOf(this));
   }
 
   /** Whether the scene is shown. */
   get loaded(): boolean {
-    return this.stage.sources.state === 'ready';
+    return this.core.sources.state === 'ready';
   }
 
   /**
@@ -185,7 +185,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * error}), or there is none. A lazy element that never enters the viewport stays pending.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.settled).then(() => undefined);
+    return this.updateComplete.then(() => this.core.settled).then(() => undefined);
   }
 
   /**
@@ -193,12 +193,12 @@ export class GaussianSplatElement extends ViewingMethods {
    * are three quarters, warm-up is the rest.
    */
   get progress(): number {
-    return this.loaded ? 1 : (this.stage.sources.progress ?? 0);
+    return this.loaded ? 1 : (this.core.sources.progress ?? 0);
   }
 
   /** Reason that no scene is shown, or null. */
   get error(): ElementError | null {
-    return this.stage.sources.error;
+    return this.core.sources.error;
   }
 
   /**
@@ -206,7 +206,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * model; `inputs-change` reports changes.
    */
   get inputs(): readonly GeneratorInput[] {
-    return this.stage.inputs;
+    return this.core.inputs;
   }
 
   /**
@@ -214,7 +214,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * those of the last {@link updateStats}.
    */
   get stats(): SceneStats | null {
-    return this.stage.stats;
+    return this.core.stats;
   }
 
   /**
@@ -222,7 +222,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * call it for panels, not for every frame.
    */
   updateStats(): Promise<SceneStats | null> {
-    return this.stage.updateStats();
+    return this.core.updateStats();
   }
 
   /** Focuses the scene if the camera can be moved; otherwise same as on HTMLElement. */
@@ -240,7 +240,7 @@ export class GaussianSplatElement extends ViewingMethods {
       const counts = (name: string | null): boolean => name === 'aria-label' || !!name?.startsWith(CONTROL_PREFIX);
       if (!records.some(({ attributeName }) => counts(attributeName))) return;
       this.requestUpdate();
-      this.stage.requestFrame();
+      this.core.requestFrame();
     });
     this.#controlObserver.observe(this, { attributes: true });
   }
@@ -253,7 +253,7 @@ export class GaussianSplatElement extends ViewingMethods {
   /** Style sheets do not move to another document, and neither does the frame if its document has lost its window. */
   adoptedCallback(from: Document): void {
     if (this.shadowRoot) adoptStyles(this.shadowRoot);
-    if (from.defaultView === null) this.stage.leaveWindowless();
+    if (from.defaultView === null) this.core.leaveWindowless();
   }
 
   /** `moveBefore()` moves the element with its state: this callback replaces the two above. */
@@ -275,30 +275,30 @@ export class GaussianSplatElement extends ViewingMethods {
   protected override willUpdate(changed: PropertyValues<this>): void {
     this.applyAttributes();
     if (isServer) return;
-    this.#readLiveValues();
+    this.#readDynamicValues();
     if (changed.has('a11y')) this.#readStrings();
     if (changed.has('time')) this.#seekToAttribute();
   }
 
   protected override updated(changed: PropertyValues<this>): void {
-    if (changed.size > 0) this.stage.requestFrame();
+    if (changed.size > 0) this.core.requestFrame();
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Set through the style object, which a strict Content-Security-Policy allows, unlike the attribute.
-    if (bar) bar.style.transform = `scaleX(${this.stage.sources.progress ?? 0})`;
+    if (bar) bar.style.transform = `scaleX(${this.core.sources.progress ?? 0})`;
   }
 
   protected override render(): TemplateResult {
-    const { sources, reveal, behaviours, labels } = this.stage;
+    const { sources, reveal, behaviours, labels } = this.core;
     const { state, progress, hasPicture } = sources;
     // If one of several scenes fails, the others stay visible.
-    const error = hasPicture ? null : this.stage.sources.error;
+    const error = hasPicture ? null : this.core.sources.error;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       canMove: this.cameraControls && error === null,
       navigation: this.#attributes.navigation,
-      walkKeys: this.stage.walk.value?.keys,
+      walkKeys: this.core.walk.value?.keys,
       poster: this.poster,
       posterLoading: this.#attributes.loading,
       showPoster: reveal.isCovered,
@@ -309,16 +309,16 @@ export class GaussianSplatElement extends ViewingMethods {
       hasPoster: this.#hasPoster,
       prompt: !prompt?.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       motionView: motion.value?.view,
-      onReset: this.stage.offersReset ? this.#onReset : null,
+      onReset: this.core.offersReset ? this.#onReset : null,
       strings: this.#strings,
       spoken: error ? this.#spokenError(error) : (announcer.value?.text ?? ''),
       hotspots: labels.value?.names ?? [],
-      handsView: this.stage.handsView,
+      handsView: this.core.handsView,
     });
   }
 
   /** Interface of the element for its core. */
-  static #hostOf(element: GaussianSplatElement): StageHost {
+  static #hostOf(element: GaussianSplatElement): ElementHost {
     return {
       source: element,
       get attributes() {
@@ -330,8 +330,8 @@ export class GaussianSplatElement extends ViewingMethods {
       get strings() {
         return element.#strings;
       },
-      get liveValues() {
-        return element.#liveValues;
+      get dynamicValues() {
+        return element.#dynamicValues;
       },
       part: <T extends HTMLElement>(selector: string) => element.renderRoot?.querySelector<T>(selector) ?? null,
       warn: (sentence) => element.#warn(sentence),
@@ -360,7 +360,7 @@ export class GaussianSplatElement extends ViewingMethods {
   };
 
   readonly #onReset = (): void => {
-    this.stage.act({ type: 'reset' });
+    this.core.act({ type: 'reset' });
     // The button is removed.
     this.focus({ preventScroll: true });
   };
@@ -378,7 +378,7 @@ export class GaussianSplatElement extends ViewingMethods {
     const before = this.#attributes;
     this.#attributes = this.#readAttributes();
     if (this.#set.size > 0 || JSON.stringify(before.camera) !== JSON.stringify(this.#attributes.camera)) {
-      this.stage.camera.applySettings(this.#attributes.camera, this.#set);
+      this.core.camera.applySettings(this.#attributes.camera, this.#set);
       this.#set.clear();
     }
   }
@@ -387,10 +387,13 @@ export class GaussianSplatElement extends ViewingMethods {
     return readAttributes(this, (sentence) => this.#warn(sentence));
   }
 
-  #readLiveValues(): void {
+  #readDynamicValues(): void {
     const pose = readNumbers(this.pose);
     if (pose === undefined && this.pose) this.#warn('<gaussian-splat>: pose expects numbers; the rest pose counts.');
-    this.#liveValues = { pose, ...readControls(this.attributes, this.inputValues, (sentence) => this.#warn(sentence)) };
+    this.#dynamicValues = {
+      pose,
+      ...readControls(this.attributes, this.inputValues, (sentence) => this.#warn(sentence)),
+    };
   }
 
   #readStrings(): void {
@@ -408,7 +411,7 @@ export class GaussianSplatElement extends ViewingMethods {
     const seconds = this.#startTime;
     if (Number.isFinite(seconds)) {
       // A pending scene starts there anyway.
-      if (this.stage.playback.canPlay && !this.stage.sources.own.isLeaving) this.currentTime = seconds;
+      if (this.core.playback.canPlay && !this.core.sources.ownEntry.isLeaving) this.currentTime = seconds;
     } else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
   }
 
@@ -419,10 +422,10 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   #showStates(): void {
-    const { state, error } = this.stage.sources;
+    const { state, error } = this.core.sources;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
-      preview: this.stage.sources.own.scene.isPreview,
+      preview: this.core.sources.ownEntry.scene.isPreview,
       ready: state === 'ready',
       playing: !this.paused,
       error: error !== null,

@@ -41,8 +41,8 @@ export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint, type PickedPoint } 
 export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';
 export { SceneTimeRanges } from './time-ranges.js';
-export type { GeneratorInput } from './live/inputs.js';
-export type { ControlValues, Numbers, ImageSource, ImageSources } from './live/values.js';
+export type { GeneratorInput } from './dynamic/inputs.js';
+export type { ControlValues, Numbers, ImageSource, ImageSources } from './dynamic/values.js';
 export type { SceneLimits } from './loading/protocol.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 

@@ -1,7 +1,7 @@
 import { notPlayed } from './controllers/playback-controller.js';
 import { SplatProperties } from './properties.js';
-import type { Timeline } from './live/live-model.js';
-import type { Stage } from './stage.js';
+import type { Timeline } from './dynamic/dynamic-model.js';
+import type { ElementCore } from './element-core.js';
 import { SceneTimeRanges } from './time-ranges.js';
 import type { LitElement } from 'lit';
 
@@ -25,7 +25,7 @@ const isSaid = (value: number | null | undefined): boolean => value !== null && 
 /** Playback of an animated scene, with the interface of HTMLMediaElement, so that controls for video work. */
 export abstract class MediaProperties extends SplatProperties {
   /** @internal */
-  protected abstract readonly stage: Stage;
+  protected abstract readonly core: ElementCore;
   /** Resolves when nothing is pending. */
   abstract get ready(): Promise<void>;
 
@@ -34,47 +34,47 @@ export abstract class MediaProperties extends SplatProperties {
    * the start position of that scene.
    */
   get currentTime(): number {
-    const { playback } = this.stage;
-    return this.isUpdatePending && this.stage.sources.own.isLeaving ? playback.nextStart : playback.currentTime;
+    const { playback } = this.core;
+    return this.isUpdatePending && this.core.sources.ownEntry.isLeaving ? playback.nextStart : playback.currentTime;
   }
 
   set currentTime(seconds: number) {
     // Frameworks set undefined or null to unset a property.
-    if (isSaid(seconds)) this.stage.seek(seconds);
+    if (isSaid(seconds)) this.core.seek(seconds);
   }
 
   /** Duration in seconds; NaN without an animated scene, Infinity for one without an end. */
   get duration(): number {
-    return this.stage.playback.duration;
+    return this.core.playback.duration;
   }
 
   /** Whether playback is paused; true if nothing is animated. */
   get paused(): boolean {
-    return this.stage.playback.paused;
+    return this.core.playback.paused;
   }
 
   /** Whether playback has reached its end. */
   get ended(): boolean {
-    return this.stage.playback.ended;
+    return this.core.playback.ended;
   }
 
   /** Whether the frame at the last set time is not shown yet. */
   get seeking(): boolean {
-    return this.stage.playback.seeking;
+    return this.core.playback.seeking;
   }
 
   /** Speed of playback; 1 is real time, negative values play backwards. */
   get playbackRate(): number {
-    return this.stage.playback.playbackRate;
+    return this.core.playback.playbackRate;
   }
 
   set playbackRate(rate: number) {
-    this.stage.playback.playbackRate = isSaid(rate) ? rate : 1;
+    this.core.playback.playbackRate = isSaid(rate) ? rate : 1;
   }
 
   /** Same as on HTMLMediaElement: 0 without a scene, 4 once it is shown, 2 while a clip waits for its next frames. */
   get readyState(): number {
-    if (this.stage.sources.state !== 'ready') return HAVE_NOTHING;
+    if (this.core.sources.state !== 'ready') return HAVE_NOTHING;
     return this.#live?.isLacking?.(this.currentTime) ? HAVE_CURRENT_DATA : HAVE_ENOUGH_DATA;
   }
 
@@ -89,12 +89,12 @@ export abstract class MediaProperties extends SplatProperties {
   }
 
   get #live(): Timeline | undefined {
-    return this.stage.sources.own.member?.scene.live;
+    return this.core.sources.ownEntry.member?.scene.live;
   }
 
   /** Fetches the scene again, as if `src` had just been set: after an error, or when the file has changed. */
   load(): void {
-    this.stage.sources.own.reload();
+    this.core.sources.ownEntry.reload();
   }
 
   /**
@@ -104,12 +104,12 @@ export abstract class MediaProperties extends SplatProperties {
    * another `src` intervenes.
    */
   async play(): Promise<void> {
-    const { playback } = this.stage;
+    const { playback } = this.core;
     const { pauses } = playback;
     // A scene that was just set is requested first: the removal of the previous one is no reason to reject.
     await this.updateComplete;
     if (playback.pauses !== pauses) throw notPlayed();
-    this.stage.prepareToPlay();
+    this.core.prepareToPlay();
     await playback.waitFor(this.ready);
     if (!playback.canPlay) throw new DOMException('There is no scene that moves', 'NotSupportedError');
     playback.play();
@@ -117,7 +117,7 @@ export abstract class MediaProperties extends SplatProperties {
 
   /** Pauses playback. */
   pause(): void {
-    this.stage.sources.own.hasBegun = true;
-    this.stage.playback.pause();
+    this.core.sources.ownEntry.hasBegun = true;
+    this.core.playback.pause();
   }
 }

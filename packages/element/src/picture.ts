@@ -7,7 +7,7 @@ import type { ImageOptions } from './viewing.js';
 export interface PictureHost {
   readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement | null;
-  readonly view: Pick<ViewController, 'painter'>;
+  readonly view: Pick<ViewController, 'backend'>;
   warn(sentence: string): void;
   /** Draws a frame into the element's canvas now; null if there is nothing to draw. */
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
@@ -21,8 +21,8 @@ const LOST = 'The GPU device was lost before the image was drawn: take it again 
 
 export async function takePicture(host: PictureHost, options: ImageOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
-  const { painter } = host.view;
-  const pixels = painter && sizeOf(options, host.canvas, painter.place.limits.maxTextureDimension2D);
+  const { backend } = host.view;
+  const pixels = backend && sizeOf(options, host.canvas, backend.place.limits.maxTextureDimension2D);
   const drawn = host.drawNow(pixels ?? undefined, background === undefined ? undefined : rgbaOf(background));
   if (drawn === null) throw nothingToDraw();
   const blob = new Promise<Blob | null>((resolve) =>
@@ -32,7 +32,7 @@ export async function takePicture(host: PictureHost, options: ImageOptions): Pro
   if (pixels || background !== undefined) host.drawNow();
   const taken = await blob;
   // A device that was lost before drawing leaves an empty image and reports the loss later.
-  if (painter && (await wasLost(painter))) throw new DOMException(LOST, 'InvalidStateError');
+  if (backend && (await wasLost(backend))) throw new DOMException(LOST, 'InvalidStateError');
   if (taken === null) throw new DOMException(`The image could not be written as ${mimeType}`, 'EncodingError');
   return taken;
 }

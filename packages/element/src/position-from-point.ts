@@ -8,19 +8,19 @@ import type { SplatChild } from './composition/child.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { ViewController } from './controllers/view-controller.js';
 import { isGone } from './gpu/device-failures.js';
-import type { Member } from './member.js';
+import type { WorldEntry } from './world-entry.js';
 import type { Meshes } from './meshes/meshes.js';
 
 export interface QueryHost {
   readonly element: Element;
   readonly sources: {
-    readonly members: readonly Member[];
+    readonly members: readonly WorldEntry[];
     readonly meshes: { readonly value: Pick<Meshes, 'hit'> | undefined };
   };
   readonly camera: Pick<CameraController, 'viewerFrame'>;
   /** Reads surface positions of the last frame. Rejects if the frame is gone. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
-  readonly view: Pick<ViewController, 'painter'>;
+  readonly view: Pick<ViewController, 'backend'>;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   readonly drawnFrom: Camera | undefined;
   /** Element that the frame covers, once it is rendered. */
@@ -39,8 +39,8 @@ export async function positionFromPoint(
   clientY: number,
 ): Promise<PickedPoint | null> {
   const { camera, view, drawnFrom: drawn, surface } = host;
-  const { painter } = view;
-  if (drawn === undefined || painter === null || surface === null) return null;
+  const { backend } = view;
+  if (drawn === undefined || backend === null || surface === null) return null;
   const share = boxPoints(surface)(clientX, clientY);
   const [x, y] = [share.x * drawn.width, share.y * drawn.height];
   if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
@@ -58,7 +58,7 @@ export async function positionFromPoint(
     return Object.assign(point, { distance: distance(eye, place), ...whose(host, answer, eye, place) });
   } catch (error) {
     // A lost device is reported elsewhere.
-    if (await isGone(painter)) return null;
+    if (await isGone(backend)) return null;
     throw error;
   }
 }
@@ -70,9 +70,9 @@ function whose(
   eye: Vector3,
   place: Vector3,
 ): Pick<PickedPoint, 'element' | 'splat' | 'mesh' | 'material'> {
-  const childOf = (isIt: (member: Member) => boolean): Element =>
+  const childOf = (isIt: (member: WorldEntry) => boolean): Element =>
     [...element.children].find((child) => {
-      const member = (child as Partial<SplatChild>).holder?.member;
+      const member = (child as Partial<SplatChild>).entry?.member;
       return member !== undefined && isIt(member);
     }) ?? element;
   if (splat) {

@@ -2,7 +2,7 @@ import type { SplatShader } from '@gaussian-splat/renderer/modifiers';
 import { LitElement, type PropertyDeclarations } from 'lit';
 import { declarations, flags, type AttributeProperties } from './attributes.js';
 import type { GaussianSplatEventMap } from './events.js';
-import type { ControlValues } from './live/values.js';
+import type { ControlValues } from './dynamic/values.js';
 
 /** Events of the element, plus the standard ones of every element, such as `click` and `keydown`. */
 type ElementEvents = GaussianSplatEventMap & Omit<HTMLElementEventMap, keyof GaussianSplatEventMap>;

@@ -10,18 +10,18 @@ import type { GaussianSplatEventMap } from './events.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import type { SceneBounds } from './camera/settings.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
-import type { GeneratorInput } from './live/inputs.js';
-import { LiveWiring, type LiveHost } from './live/live-wiring.js';
+import type { GeneratorInput } from './dynamic/inputs.js';
+import { DynamicWiring, type DynamicHost } from './dynamic/dynamic-wiring.js';
 import type { ProgressListener } from './loading/protocol.js';
-import type { Member } from './member.js';
-import type { Services, Source } from './stage-host.js';
-import { costOf, type PartStats } from './stats.js';
+import type { WorldEntry } from './world-entry.js';
+import type { Services, Source } from './element-host.js';
+import { costOf, type ChildStats } from './stats.js';
 
 /** Services of an entry that no longer belongs to an element. */
 const NO_SERVICES = { releaseDelay: 0 } as Services;
 
 /** The interface of the element that an entry uses. */
-export interface EntryStage {
+export interface EntryCore {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly attributes: Attributes;
   readonly services: Services;
@@ -45,11 +45,16 @@ export interface EntryStage {
 
 /** The list that it is in. */
 export interface EntryList {
-  readonly own: SourceEntry;
+  readonly ownEntry: SourceEntry;
   readonly shown: readonly LoadedGaussians[];
   add(entry: SourceEntry): void;
   remove(entry: SourceEntry): void;
-  show(entry: SourceEntry, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void>;
+  show(
+    entry: SourceEntry,
+    scene: LoadedGaussians,
+    entrance: Entrance,
+    enter: (member: WorldEntry) => void,
+  ): Promise<void>;
   left(clear: boolean): void;
   settledOne(): void;
   contextChanged(type: 'contextlost' | 'contextrestored', entry: SourceEntry): void;
@@ -59,7 +64,7 @@ export interface EntryList {
 export interface SourceOwner {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly source: Source;
-  readonly liveValues: LiveHost['liveValues'];
+  readonly dynamicValues: DynamicHost['dynamicValues'];
   /** False if it follows the clock of its parent element. */
   readonly hasOwnClock: boolean;
   /** Attributes that differ from those of the element. */
@@ -67,9 +72,9 @@ export interface SourceOwner {
   /** Opens sources other than splats. */
   readonly open?: SceneHost['open'];
   /** Sets its transform; absent if its frame is the world's. */
-  place?(member: Member, stage: EntryStage): void;
+  place?(member: WorldEntry, core: EntryCore): void;
   /** A camera of the world in its own coordinates. */
-  seenFrom?(camera: Camera, member: Member | undefined, stage: EntryStage): Camera;
+  seenFrom?(camera: Camera, member: WorldEntry | undefined, core: EntryCore): Camera;
   warn(sentence: string): void;
 }
 
@@ -77,11 +82,11 @@ export interface SourceOwner {
  * The lifecycle of one source of the element or of a child: request, loading, display, clock, generator, and levels of
  * detail.
  */
-export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHost, DetailHost {
+export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, DynamicHost, DetailHost {
   readonly owner: SourceOwner;
   readonly scene: SceneController;
   readonly ownClock: PlaybackController;
-  readonly live: LiveWiring;
+  readonly live: DynamicWiring;
   readonly #source: SourceController;
   /** Only scenes with the attribute `detail`, and those too slow to draw in full during motion, need it. */
   readonly #detail = new Lazy(
@@ -93,10 +98,10 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     () => this.#updateDetail(),
   );
   /** The element that it belongs to, or belonged to last. */
-  #stage: EntryStage | undefined;
+  #core: EntryCore | undefined;
   #isIn = false;
   /** Its member of the world. */
-  member: Member | undefined;
+  member: WorldEntry | undefined;
   /** Loading progress, 0..1; null while unknown. */
   progress: number | null = null;
   /** It has played or was paused, so it no longer starts automatically. */
@@ -104,12 +109,12 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   /** Bytes received, and bytes in total. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
-  constructor(owner: SourceOwner, stage?: EntryStage) {
+  constructor(owner: SourceOwner, core?: EntryCore) {
     this.owner = owner;
-    this.#stage = stage;
-    this.#isIn = stage !== undefined;
+    this.#core = core;
+    this.#isIn = core !== undefined;
     this.ownClock = new PlaybackController(this);
-    this.live = new LiveWiring(this);
+    this.live = new DynamicWiring(this);
     this.scene = new SceneController(owner.element, this);
     this.#source = new SourceController(this);
   }
@@ -126,7 +131,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
 
   /** The clock that it follows. */
   get playback(): PlaybackController {
-    return this.owner.hasOwnClock || !this.#stage ? this.ownClock : this.#stage.sources.own.ownClock;
+    return this.owner.hasOwnClock || !this.#core ? this.ownClock : this.#core.sources.ownEntry.ownClock;
   }
 
   /** Seconds that it moves for; NaN for what does not. */
@@ -148,19 +153,19 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     return this.member?.scene.live?.inputs ?? [];
   }
 
-  get stats(): PartStats {
+  get stats(): ChildStats {
     const { state, error, scene } = this.scene;
     return { element: this.owner.element, state, error, ...costOf(scene) };
   }
 
   /** Moves the entry to this element, or to none, together with its loaded scene. */
-  attach(stage: EntryStage | null): void {
-    if (this.#isIn && stage === this.#stage) return this.update();
-    if (this.#isIn) this.#stage!.sources.remove(this);
-    this.#isIn = stage !== null;
-    if (stage === null) return;
-    this.#stage = stage;
-    stage.sources.add(this);
+  attach(core: EntryCore | null): void {
+    if (this.#isIn && core === this.#core) return this.update();
+    if (this.#isIn) this.#core!.sources.remove(this);
+    this.#isIn = core !== null;
+    if (core === null) return;
+    this.#core = core;
+    core.sources.add(this);
     this.update();
     const { scene } = this.scene;
     if (scene && !scene.isLost) void this.show(scene, 'again').catch((error: unknown) => this.scene.fail(error));
@@ -168,7 +173,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
 
   /** The element that it belongs to; null for none. */
   get parent(): Element | null {
-    return this.#isIn ? this.#stage!.element : null;
+    return this.#isIn ? this.#core!.element : null;
   }
 
   /** Reads the attributes again: its owner, or the parent element, may request another source. */
@@ -209,18 +214,18 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
 
   /** The clock of a source that plays automatically. */
   get player(): PlaybackController | undefined {
-    return this.#stage && this.attributes.autoplay ? this.ownClock : undefined;
+    return this.#core && this.attributes.autoplay ? this.ownClock : undefined;
   }
 
   /** Starts automatic playback if that is allowed. */
   startPlaying(): void {
-    if (!this.hasBegun && this.#stage?.mayMove && this.player?.canPlay) this.ownClock.play();
+    if (!this.hasBegun && this.#core?.mayMove && this.player?.canPlay) this.ownClock.play();
   }
 
   /** Sets its transform before a frame. */
   place(): void {
     // Reading a member's count may replace its splats in the world.
-    if (this.member?.placement && this.#isIn) this.owner.place?.(this.member, this.#stage!);
+    if (this.member?.placement && this.#isIn) this.owner.place?.(this.member, this.#core!);
   }
 
   /** Advances its motion to the time of a frame. The last frame of a scene about to be replaced stays unchanged. */
@@ -242,27 +247,27 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   get attributes(): Attributes {
     const { overrides } = this.owner;
     // A child has its own attributes before it belongs to an element.
-    return overrides ? { ...(this.#stage?.attributes as Attributes), ...overrides } : this.#stage!.attributes;
+    return overrides ? { ...(this.#core?.attributes as Attributes), ...overrides } : this.#core!.attributes;
   }
 
   get services(): Services {
-    return this.#stage?.services ?? NO_SERVICES;
+    return this.#core?.services ?? NO_SERVICES;
   }
 
   get isInSight(): boolean {
-    return this.#stage!.isInSight;
+    return this.#core!.isInSight;
   }
 
   get isConnected(): boolean {
-    return this.#isIn && this.#stage!.element.isConnected;
+    return this.#isIn && this.#core!.element.isConnected;
   }
 
   get wantsPreviews(): boolean {
-    return this.#stage!.wantsPreviews;
+    return this.#core!.wantsPreviews;
   }
 
   get memoryBudget(): number | undefined {
-    return this.#stage!.memoryBudget;
+    return this.#core!.memoryBudget;
   }
 
   get open(): SceneHost['open'] {
@@ -270,25 +275,25 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   }
 
   get shown(): readonly LoadedGaussians[] {
-    return this.#isOwn ? this.#stage!.sources.shown : [];
+    return this.#isOwn ? this.#core!.sources.shown : [];
   }
 
-  get liveValues(): LiveHost['liveValues'] {
-    return this.owner.liveValues;
+  get dynamicValues(): DynamicHost['dynamicValues'] {
+    return this.owner.dynamicValues;
   }
 
-  get liveRequest(): SceneHost['liveRequest'] {
-    const stage = this.#stage!;
+  get dynamicRequest(): SceneHost['dynamicRequest'] {
+    const core = this.#core!;
     return {
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
       loader: this.services.sceneLoader,
       state: () => this.live.state,
       loops: () => this.playback.loops,
-      ownsControls: () => !stage.sources.own.live.hasPost,
+      ownsControls: () => !core.sources.ownEntry.live.hasPost,
       camera: (bounds) => {
-        if (bounds && this.#isOwn) stage.camera.frame(bounds);
-        return this.#seenFrom(stage.firstView);
+        if (bounds && this.#isOwn) core.camera.frame(bounds);
+        return this.#seenFrom(core.firstView);
       },
       listeners: this.live.listeners,
     };
@@ -297,11 +302,11 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   // Notifications of the controllers.
 
   requestFrame(): void {
-    this.#stage?.requestFrame();
+    this.#core?.requestFrame();
   }
 
   splatsChanged(): void {
-    this.#stage?.splatsChanged();
+    this.#core?.splatsChanged();
   }
 
   warn(sentence: string): void {
@@ -317,17 +322,17 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     if (type !== 'play' && type !== 'pause') return;
     this.hasBegun ||= type === 'play';
     // Custom states and the pause button depend on them, too.
-    this.#stage?.element.requestUpdate();
+    this.#core?.element.requestUpdate();
   }
 
   async show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
     if (!this.#isIn) return;
     if (!this.#isOwn) this.ownClock.setDuration(this.duration);
-    await this.#stage!.sources.show(this, scene, entrance, (member) => {
+    await this.#core!.sources.show(this, scene, entrance, (member) => {
       this.leave();
       this.member = member;
       this.place();
-      this.live.tellInputs(this.#isOwn ? this.#stage!.inputs : this.inputs);
+      this.live.notifyInputs(this.#isOwn ? this.#core!.inputs : this.inputs);
     });
   }
 
@@ -335,7 +340,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
     this.leave();
     this.ownClock.suspend();
     if (clear) this.ownClock.empty();
-    if (this.#isIn) this.#stage!.sources.left(clear);
+    if (this.#isIn) this.#core!.sources.left(clear);
   }
 
   /** Leaves the world: its splats are about to be freed, or to be shown in another element. */
@@ -351,7 +356,7 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   progressed(...[loaded, total, share = total ? loaded / total : undefined]: Parameters<ProgressListener>): void {
     this.#bytes = [loaded, total];
     this.progress = share === undefined ? null : Math.min(1, share);
-    this.#stage?.element.requestUpdate();
+    this.#core?.element.requestUpdate();
     this.dispatch(new ProgressEvent('progress', { lengthComputable: total !== undefined, loaded, total: total ?? 0 }));
   }
 
@@ -361,17 +366,17 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   }
 
   loaded(url: string): void {
-    this.tellLoaded(url);
+    this.notifyLoaded(url);
     this.update();
-    this.#stage?.sources.settledOne();
+    this.#core?.sources.settledOne();
   }
 
-  tellLoaded(url: string): void {
+  notifyLoaded(url: string): void {
     for (const type of ['loadeddata', 'canplay'] as const) this.dispatch(new Event(type));
     this.dispatch(new CustomEvent('load', { detail: { url } }));
   }
 
-  tellFailed(error: ElementError): void {
+  notifyFailed(error: ElementError): void {
     this.dispatch(new CustomEvent('error', { detail: error }));
   }
 
@@ -388,17 +393,17 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
 
   failed(error: ElementError): void {
     this.progress = null;
-    this.tellFailed(error);
+    this.notifyFailed(error);
     if (!this.#isOwn) this.contextChanged('contextrestored');
-    this.#stage?.sources.settledOne();
+    this.#core?.sources.settledOne();
   }
 
   contextChanged(type: 'contextlost' | 'contextrestored'): void {
-    this.#stage?.sources.contextChanged(type, this);
+    this.#core?.sources.contextChanged(type, this);
   }
 
   get #isOwn(): boolean {
-    return this.#stage?.sources.own === this;
+    return this.#core?.sources.ownEntry === this;
   }
 
   #updateDetail(): void {
@@ -408,6 +413,6 @@ export class SourceEntry implements SceneHost, SourceHost, PlaybackHost, LiveHos
   readonly #warnOf = ({ message }: Error): void => this.warn(message);
 
   #seenFrom(camera: Camera): Camera {
-    return this.owner.seenFrom?.(camera, this.member, this.#stage!) ?? camera;
+    return this.owner.seenFrom?.(camera, this.member, this.#core!) ?? camera;
   }
 }

@@ -8,15 +8,15 @@ import type { ElementError } from './errors.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
-import type { LodSettings, Drawable } from './gpu/painter.js';
-import { Member } from './member.js';
+import type { LodSettings, Drawable } from './gpu/backend.js';
+import { WorldEntry } from './world-entry.js';
 import type { EntryList, SourceEntry } from './source-entry.js';
 
 /** States by priority for the combined state of several entries. */
 const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
 
 /** The interface of the element that the list uses. */
-export interface ListStage {
+export interface ListCore {
   readonly camera: Pick<CameraController, 'frame' | 'refine'>;
   readonly frame: ViewerFrame;
   requestFrame(): void;
@@ -34,24 +34,24 @@ export interface ListStage {
 export class SourceList implements EntryList {
   /** All that is drawn. */
   readonly world = new World();
-  readonly own: SourceEntry;
+  readonly ownEntry: SourceEntry;
   readonly meshes = new Lazy('the code that shows meshes', async () => {
     const { Meshes } = await import('./meshes/meshes.js');
-    return new Meshes(this, this.#stage);
+    return new Meshes(this, this.#core);
   });
-  readonly #stage: ListStage;
+  readonly #core: ListCore;
   readonly #all: SourceEntry[];
   /** Sources are shown one after the other, so that a failure can be attributed. */
   #arrivals: Promise<void> | undefined;
   #latest: SourceEntry | undefined;
   #isFramed = false;
-  #isToldLoaded = false;
+  #isLoadReported = false;
   readonly #lost = new Set<SourceEntry>();
 
-  constructor(stage: ListStage, own: SourceEntry) {
-    this.#stage = stage;
-    this.own = own;
-    this.#all = [own];
+  constructor(core: ListCore, ownEntry: SourceEntry) {
+    this.#core = core;
+    this.ownEntry = ownEntry;
+    this.#all = [ownEntry];
   }
 
   // Membership.
@@ -73,7 +73,7 @@ export class SourceList implements EntryList {
     return this.#all;
   }
 
-  get members(): readonly Member[] {
+  get members(): readonly WorldEntry[] {
     return this.#all.flatMap(({ member }) => member ?? []);
   }
 
@@ -92,19 +92,24 @@ export class SourceList implements EntryList {
    * rejects with GaussianSplatError `out-of-memory/*`.
    * @param enter adds it to the world
    */
-  show(entry: SourceEntry, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void> {
+  show(
+    entry: SourceEntry,
+    scene: LoadedGaussians,
+    entrance: Entrance,
+    enter: (member: WorldEntry) => void,
+  ): Promise<void> {
     const show = async (): Promise<void> => {
       if (scene.model) await (await this.meshes.get()).prepare(scene);
-      await this.#stage.prepareFor(scene);
+      await this.#core.prepareFor(scene);
       if (scene.isDestroyed || scene.isLost || entry.scene.scene !== scene || !this.#all.includes(entry)) return;
-      scene.onChange = () => this.#stage.requestFrame();
-      for (const warning of scene.warnings) this.#stage.warn(`<gaussian-splat>: ${warning}`);
-      enter(new Member(this.world, scene));
+      scene.onChange = () => this.#core.requestFrame();
+      for (const warning of scene.warnings) this.#core.warn(`<gaussian-splat>: ${warning}`);
+      enter(new WorldEntry(this.world, scene));
       this.#latest = entry;
       this.changed();
       if (scene.hasMeshes) void this.#addMeshes(entry, scene);
       this.frame(entrance, entry);
-      await this.#stage.draw(scene);
+      await this.#core.draw(scene);
     };
     const shown = this.#arrivals ? this.#arrivals.then(show) : show();
     const over = shown
@@ -118,10 +123,10 @@ export class SourceList implements EntryList {
 
   /** Draws the remaining sources after one is hidden. */
   left(clear: boolean): void {
-    this.#stage.splatsChanged();
+    this.#core.splatsChanged();
     if (this.#isEmpty) {
-      if (clear) this.#isToldLoaded = this.#isFramed = false;
-      this.#stage.stopDrawing(clear);
+      if (clear) this.#isLoadReported = this.#isFramed = false;
+      this.#core.stopDrawing(clear);
     }
     this.meshes.value?.forget();
   }
@@ -131,15 +136,15 @@ export class SourceList implements EntryList {
     const entered = this.#all.filter(({ member }) => member !== undefined);
     const latest = entered.find((entry) => entry === this.#latest);
     this.#latest = undefined;
-    (latest ?? (this.own.member ? this.own : (entered.at(-1) ?? this.own))).scene.fail(error);
+    (latest ?? (this.ownEntry.member ? this.ownEntry : (entered.at(-1) ?? this.ownEntry))).scene.fail(error);
   }
 
   /** Frames all sources. */
   frame(entrance: Entrance, entry?: SourceEntry): void {
     const { bounds } = this;
     if (entrance === 'again' || bounds === null) return;
-    const { camera } = this.#stage;
-    if (!this.#isFramed || (entry === this.own && entrance === 'new')) camera.frame(bounds);
+    const { camera } = this.#core;
+    if (!this.#isFramed || (entry === this.ownEntry && entrance === 'new')) camera.frame(bounds);
     else camera.refine(bounds);
     this.#isFramed = true;
   }
@@ -147,7 +152,7 @@ export class SourceList implements EntryList {
   /** The drawn splats or their duration have changed. */
   changed(): void {
     this.#setDuration();
-    this.#stage.splatsChanged();
+    this.#core.splatsChanged();
   }
 
   /** One source is shown or has failed. */
@@ -155,11 +160,11 @@ export class SourceList implements EntryList {
     this.changed();
     // The events of an element without a scene of its own are those of its children together.
     const isOver = this.#all.every(({ state }) => state !== 'loading' && state !== 'waiting');
-    if (this.own.state !== 'empty' || !isOver || this.#isToldLoaded) return;
+    if (this.ownEntry.state !== 'empty' || !isOver || this.#isLoadReported) return;
     const shown = this.#all.find(({ state }) => state === 'ready');
-    this.#isToldLoaded = shown !== undefined;
-    if (shown) this.own.tellLoaded(shown.scene.url);
-    else if (this.error) this.own.tellFailed(this.error);
+    this.#isLoadReported = shown !== undefined;
+    if (shown) this.ownEntry.notifyLoaded(shown.scene.url);
+    else if (this.error) this.ownEntry.notifyFailed(this.error);
   }
 
   /** Reports to the page that a device was lost, or that all sources are restored. */
@@ -168,7 +173,7 @@ export class SourceList implements EntryList {
     if (type === 'contextlost') this.#lost.add(entry);
     else this.#lost.delete(entry);
     if (type === 'contextlost' ? before === 0 : before > 0 && this.#lost.size === 0)
-      this.#stage.dispatch(new Event(type));
+      this.#core.dispatch(new Event(type));
   }
 
   /** Meshes of a file that also has splats load after the splats; their failure leaves the splats visible. */
@@ -181,21 +186,21 @@ export class SourceList implements EntryList {
       if (scene.isDestroyed) return;
       const warning = `The triangles are not shown: ${(error as Error).message}`;
       scene.warnings = [...scene.warnings, warning];
-      this.#stage.warn(`<gaussian-splat>: ${warning}`);
+      this.#core.warn(`<gaussian-splat>: ${warning}`);
     }
   }
 
   // State of all sources together.
 
   get state(): SceneState {
-    const { state } = this.own;
+    const { state } = this.ownEntry;
     if (state !== 'empty' && state !== 'failed') return state;
     return STATES.find((each) => this.#all.some((entry) => entry.state === each)) ?? state;
   }
 
   /** Reason that nothing is shown. */
   get error(): ElementError | null {
-    const { error, state } = this.own;
+    const { error, state } = this.ownEntry;
     if (error || state !== 'empty' || this.state !== 'failed') return error;
     return this.#all.find((entry) => entry.error)?.error ?? null;
   }
@@ -231,7 +236,7 @@ export class SourceList implements EntryList {
   get bounds(): SceneBounds | null {
     this.place();
     const bounds = boundsOfWorld(this.world);
-    return bounds ? { ...bounds, up: this.own.member?.scene.bounds.up } : null;
+    return bounds ? { ...bounds, up: this.ownEntry.member?.scene.bounds.up } : null;
   }
 
   /** The same, measured again for generators, which may have moved. */
@@ -260,7 +265,7 @@ export class SourceList implements EntryList {
 
   get stats(): SourceEntry['stats'][] {
     return this.#all.length > 1
-      ? this.#all.flatMap((entry) => (entry.state === 'empty' && entry === this.own ? [] : [entry.stats]))
+      ? this.#all.flatMap((entry) => (entry.state === 'empty' && entry === this.ownEntry ? [] : [entry.stats]))
       : [];
   }
 
@@ -272,7 +277,7 @@ export class SourceList implements EntryList {
 
   advance(camera: Camera, now: number): void {
     // Its own scene may stand still while others follow the element's clock.
-    this.own.ownClock.tick(now);
+    this.ownEntry.ownClock.tick(now);
     for (const entry of this.#all) entry.advance(camera, now);
   }
 
@@ -295,16 +300,16 @@ export class SourceList implements EntryList {
 
   /** The element's clock has the duration of its own scene, or else of the sources that follow it. */
   #setDuration(): void {
-    const { own } = this;
-    if (own.member === undefined && (own.state === 'waiting' || own.state === 'loading')) return;
+    const { ownEntry } = this;
+    if (ownEntry.member === undefined && (ownEntry.state === 'waiting' || ownEntry.state === 'loading')) return;
     // Sources that were lost with a device return, and their time continues.
     if (this.#lost.size > 0) return;
-    const clock = own.ownClock;
+    const clock = ownEntry.ownClock;
     const couldPlay = clock.canPlay;
     const followed = this.#all.flatMap((entry) => (entry.owner.hasOwnClock ? [] : [entry.duration]));
     const moving = followed.filter((seconds) => !Number.isNaN(seconds));
-    clock.setDuration(Number.isNaN(own.duration) && moving.length > 0 ? Math.max(...moving) : own.duration);
+    clock.setDuration(Number.isNaN(ownEntry.duration) && moving.length > 0 ? Math.max(...moving) : ownEntry.duration);
     // Sources that follow the clock may start after the poster is dismissed.
-    if (!couldPlay && clock.canPlay) own.startPlaying();
+    if (!couldPlay && clock.canPlay) ownEntry.startPlaying();
   }
 }

@@ -1,7 +1,7 @@
 /** Addresses and requests from an element's attributes. */
 import { credentialsOf, type Attributes } from './attributes.js';
 import type { SceneRequest } from './loading/protocol.js';
-import type { Source } from './stage-host.js';
+import type { Source } from './element-host.js';
 
 /** The page's rewriting of every address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;

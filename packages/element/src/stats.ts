@@ -5,7 +5,7 @@ import type { DynamicQualityReport } from './controllers/dynamic-quality-control
 import type { SceneState } from './controllers/scene-controller.js';
 import type { ElementError } from './errors.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
-import type { ReadCounts } from './gpu/painter.js';
+import type { ReadCounts } from './gpu/backend.js';
 
 /** Counts of modeled, drawn and visible splats of a scene, its memory, and the reasons for reductions. */
 export interface SceneStats {
@@ -50,13 +50,13 @@ export interface SceneStats {
    */
   readonly warnings: readonly string[];
   /** The element's own scene, then its children, separately; empty for an element without children. */
-  readonly scenes: readonly PartStats[];
+  readonly scenes: readonly ChildStats[];
   /** Reductions of the scene to save time or memory, in English; empty without reductions. */
   readonly why: readonly string[];
 }
 
 /** State and memory of one child of the element. */
-export interface PartStats {
+export interface ChildStats {
   /** The child; the element itself for its own scene. */
   readonly element: HTMLElement;
   readonly state: SceneState;
@@ -74,7 +74,7 @@ export interface PartStats {
 /** Memory and counts of a scene. */
 export const costOf = (
   scene: LoadedGaussians | null,
-): Pick<PartStats, 'splats' | 'triangles' | 'dropped' | 'bytes'> => ({
+): Pick<ChildStats, 'splats' | 'triangles' | 'dropped' | 'bytes'> => ({
   splats: scene ? (scene.gaussians.frameCount ?? scene.gaussians.count) : 0,
   triangles: scene?.model?.triangles ?? 0,
   dropped: scene?.gaussians.droppedCount ?? 0,
@@ -93,7 +93,7 @@ export interface StatsContext {
   readonly pixelShare?: number | undefined;
   /** Allowed error of images at rest, pixels. */
   readonly pixels: number | undefined;
-  readonly parts: readonly PartStats[];
+  readonly parts: readonly ChildStats[];
 }
 
 /** Statistics that need no readback from the GPU. */

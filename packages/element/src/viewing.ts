@@ -26,44 +26,44 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** True while the poster does not cover the scene. */
   get revealed(): boolean {
-    return !this.stage.reveal.isCovered;
+    return !this.core.reveal.isCovered;
   }
 
   /** Shows the scene as soon as possible, and loads a lazy one: `reveal="manual"` waits for this call. */
   dismissPoster(): void {
-    this.stage.reveal.dismiss();
+    this.core.reveal.dismiss();
   }
 
   /** Covers the scene with its poster again. */
   showPoster(): void {
-    this.stage.reveal.cover();
+    this.core.reveal.cover();
   }
 
   /** The current position of the camera; as a string, a value for `camera-orbit`. */
   getCameraOrbit(): CameraOrbit {
-    return this.stage.camera.orbit;
+    return this.core.camera.orbit;
   }
 
   /** The point that the camera looks at; as a string, a value for `camera-target`. */
   getCameraTarget(): CameraTarget {
-    return this.stage.camera.target;
+    return this.core.camera.target;
   }
 
   /** The current vertical field of view; as a string, a value for `field-of-view`. */
   getFieldOfView(): FieldOfView {
-    return this.stage.camera.fieldOfView;
+    return this.core.camera.fieldOfView;
   }
 
   /** Jumps to the goal of the camera's current motion. */
   jumpCameraToGoal(): void {
     this.applyAttributes();
-    this.stage.camera.jumpToGoal();
+    this.core.camera.jumpToGoal();
   }
 
   /** Resets the camera to the pose of the attributes. */
   resetCamera(): void {
     this.applyAttributes();
-    this.stage.camera.reset('none');
+    this.core.camera.reset('none');
   }
 
   /**
@@ -73,22 +73,22 @@ export abstract class ViewingMethods extends MediaProperties {
    * camera. Rejects with `argument/camera` for a malformed view or an unknown name.
    */
   async flyTo(view: CameraView | string | number, options?: FlightOptions): Promise<boolean> {
-    return (await this.stage.tour.get()).flyTo(view, options);
+    return (await this.core.tour.get()).flyTo(view, options);
   }
 
   /** Flies to the next view of the list, and from the last to the first. See {@link flyTo}. */
   async nextView(options?: FlightOptions): Promise<boolean> {
-    return (await this.stage.tour.get()).step(1, options);
+    return (await this.core.tour.get()).step(1, options);
   }
 
   /** Flies to the previous view of the list. See {@link flyTo}. */
   async previousView(options?: FlightOptions): Promise<boolean> {
-    return (await this.stage.tour.get()).step(-1, options);
+    return (await this.core.tour.get()).step(-1, options);
   }
 
   /** Flies through all views of the list on one smooth path, or along the keyframes of its file. See {@link flyTo}. */
   async flyAlong(options?: PathOptions): Promise<boolean> {
-    return (await this.stage.tour.get()).flyAlong(options);
+    return (await this.core.tour.get()).flyAlong(options);
   }
 
   /**
@@ -96,23 +96,23 @@ export abstract class ViewingMethods extends MediaProperties {
    * @param share 0..1, from the first view to the last
    */
   async showAlong(share: number): Promise<void> {
-    return (await this.stage.tour.get()).showAlong(share);
+    return (await this.core.tour.get()).showAlong(share);
   }
 
   /** Shows the interaction prompt again, as if no visitor had touched the scene. */
   resetInteractionPrompt(): void {
-    this.stage.behaviours.prompt?.reset();
+    this.core.behaviours.prompt?.reset();
   }
 
   /** Frames the scene as after loading, for generators whose scene has grown or moved. */
   async updateFraming(): Promise<void> {
     this.applyAttributes();
-    await this.stage.updateFraming();
+    await this.core.updateFraming();
   }
 
   /** Box around nearly all of the scene, in meters of viewer space; null while none is shown. */
   getBoundingBox(): SceneBox | null {
-    return boxOf({ camera: this.stage.camera, bounds: this.stage.sources.bounds });
+    return boxOf({ camera: this.core.camera, bounds: this.core.sources.bounds });
   }
 
   /**
@@ -123,12 +123,12 @@ export abstract class ViewingMethods extends MediaProperties {
    * @returns null outside the scene, and on parts less than half opaque.
    */
   positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null> {
-    return this.stage.positionFromPoint(clientX, clientY);
+    return this.core.positionFromPoint(clientX, clientY);
   }
 
   /** The current position of the hotspot in a slot, for example `hotspot-door`; null if there is none with a position. */
   queryHotspot(name: string): HotspotPlace | null {
-    return this.stage.labels.value?.query(name) ?? null;
+    return this.core.labels.value?.query(name) ?? null;
   }
 
   /**
@@ -140,7 +140,7 @@ export abstract class ViewingMethods extends MediaProperties {
   async toBlob(options: ImageOptions = {}): Promise<Blob> {
     const { takePicture } = await loadModule('the code for images', () => import('./picture.js'));
     this.applyAttributes();
-    return takePicture(this.stage, options);
+    return takePicture(this.core, options);
   }
 
   /**
@@ -149,7 +149,7 @@ export abstract class ViewingMethods extends MediaProperties {
    */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
     this.applyAttributes();
-    const canvas = this.stage.drawNow();
+    const canvas = this.core.drawNow();
     if (canvas === null)
       throw new DOMException('Expected a loaded scene in an element that has a size', 'InvalidStateError');
     return canvas.toDataURL(mimeType, qualityArgument);

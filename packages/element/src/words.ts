@@ -1,7 +1,7 @@
 /** The words that the element says to people, and those that a page may put in their place. */
 import type { ViewName } from './camera/spoken.js';
 import type { ElementErrorCode } from './errors.js';
-import type { PANEL_WORDS } from './live/controls-panel.js';
+import type { PANEL_WORDS } from './dynamic/controls-panel.js';
 
 /**
  * Texts of the element except those for the camera's position, in English; `…` stands for the scene's text alternative.

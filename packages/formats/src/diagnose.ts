@@ -2,7 +2,7 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
 import { asciiOf, grouped, quote } from './bytes.js';
 import { foreignName, sampleText, type ForeignName } from './foreign-signatures.js';
-import { UNREAD_KINDS, unreadKind, type UnreadKind } from './unread-kinds.js';
+import { UNREAD_KINDS, unreadKind, type UnreadKind } from './unsupported-formats.js';
 
 /** A kind of file that is recognized only for an error message. */
 interface ForeignKind {

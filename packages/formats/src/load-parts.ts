@@ -1,7 +1,7 @@
 import { loadModule } from '@gaussian-splat/core';
 import type * as detection from './detect.js';
 import type * as diagnosis from './diagnose.js';
-import type * as leftOut from './left-out.js';
+import type * as leftOut from './dropped-splats.js';
 import type * as previews from './preview.js';
 import type { SceneFormat, SceneReader } from './scene-format.js';
 
@@ -24,4 +24,4 @@ export const loadPreviews = (): Promise<typeof previews> =>
 
 /** Reports dropped splats. */
 export const loadLeftOut = (): Promise<typeof leftOut> =>
-  loadModule('the code of warnings', () => import('./left-out.js'));
+  loadModule('the code of warnings', () => import('./dropped-splats.js'));

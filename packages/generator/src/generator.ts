@@ -1,10 +1,10 @@
 import { ContractError, type GaussianLayout } from '@gaussian-splat/core/contract';
-import { batchOf, type Seat } from './batch/batch.js';
+import { batchOf, type BatchSlot } from './batch/batch.js';
 import { Chain } from './chain/chain.js';
 import { sameInputs, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
 import type { GeneratorSession } from './runtime/generator-session.js';
-import type { RunOutputs, SessionKind } from './runtime/live-session.js';
+import type { RunOutputs, SessionKind } from './runtime/ort-session.js';
 import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
@@ -70,7 +70,7 @@ export class Generator {
   sink: GaussianSink | undefined;
   readonly #chain: Chain;
   readonly #options: GeneratorOptions;
-  readonly #runner: RunLoop<RunRequest> | Seat<InstanceRequest>;
+  readonly #runner: RunLoop<RunRequest> | BatchSlot<InstanceRequest>;
   #shown: RunRequest['inputs'] | undefined;
   #asked: RunRequest | undefined;
   /** Inputs of the last run. */
@@ -174,7 +174,7 @@ export class Generator {
     });
   }
 
-  #seatOf(session: GeneratorSession): Seat<InstanceRequest> {
+  #seatOf(session: GeneratorSession): BatchSlot<InstanceRequest> {
     return batchOf(session).join<InstanceRequest>({
       isDue: ({ inputs }) => this.#isDue([inputs]),
       take: ({ inputs }, outputs, instance) => this.#take([inputs], outputs, instance),

@@ -28,7 +28,7 @@ export { GeneratorSession } from './runtime/generator-session.js';
 export { answerCpuRun, type CpuRunMessage, type StartWorker } from './proof/run-on-cpu.js';
 export { compareParts, isDifferent, type ComparedPart, type Comparison } from './proof/compare.js';
 export type { Verdict } from './proof/record.js';
-export type { RunOutputs, SessionKind } from './runtime/live-session.js';
+export type { RunOutputs, SessionKind } from './runtime/ort-session.js';
 export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
 export { readTensors, type TensorPart } from './runtime/tensor-buffers.js';
 export { openModel, type GeneratorModel, type ModelSource } from './runtime/open-model.js';

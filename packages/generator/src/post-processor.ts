@@ -3,7 +3,7 @@ import { Chain } from './chain/chain.js';
 import { imageShapeOf } from './bind-pictures.js';
 import { sameInputs, type GpuTensor, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
-import type { SessionKind } from './runtime/live-session.js';
+import type { SessionKind } from './runtime/ort-session.js';
 import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';

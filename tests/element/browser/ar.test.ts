@@ -79,8 +79,8 @@ describe('AR', () => {
 
   itInLab('stands on the plane, front to the person, in its true size', async () => {
     const [element, m] = await start({ 'ar-scale': 'fixed', unit: '10cm' });
-    const { bounds } = (element as unknown as { stage: { camera: { bounds: { center: number[]; radius: number } } } })
-      .stage.camera;
+    const { bounds } = (element as unknown as { core: { camera: { bounds: { center: number[]; radius: number } } } })
+      .core.camera;
     const size = Math.hypot(m[0], m[1], m[2]);
     assert(Math.abs(size / 0.1 - 1) < 1e-3, `${size} m for a unit`);
     const { readScene, fetchScene } = await import('@gaussian-splat/formats');
@@ -102,7 +102,7 @@ describe('AR', () => {
 
   itInLab('is 0.5 to 1 m large at first where no size is known', async () => {
     const [element, m] = await start({});
-    const { bounds } = (element as unknown as { stage: { camera: { bounds: { radius: number } } } }).stage.camera;
+    const { bounds } = (element as unknown as { core: { camera: { bounds: { radius: number } } } }).core.camera;
     const size = 2 * bounds.radius * Math.hypot(m[0], m[1], m[2]);
     assert(size > 0.45 && size < 1.05, `${size} m`);
     element.exitXR!();

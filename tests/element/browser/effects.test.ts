@@ -34,17 +34,17 @@ async function cut(parent: Element, attributes: Readonly<Record<string, string>>
   parent.append(child);
   const element = parent.closest('gaussian-splat')!;
   await customElements.whenDefined('splat-cut');
-  await until(() => stageOf(element).sources.world.placements.some(({ modifier }) => modifier), 'the cut acts');
+  await until(() => coreOf(element).sources.world.placements.some(({ modifier }) => modifier), 'the cut acts');
   await frames(3);
   return child;
 }
 
 interface Inside {
-  readonly stage: {
+  readonly core: {
     readonly sources: { readonly world: { readonly placements: readonly { readonly modifier: unknown }[] } };
   };
 }
-const stageOf = (element: GaussianSplatElement): Inside['stage'] => (element as unknown as Inside).stage;
+const coreOf = (element: GaussianSplatElement): Inside['core'] => (element as unknown as Inside).core;
 
 it('a cut hides what is inside or outside, moves without a pipeline or a buffer, and goes again', async () => {
   const element = await showLoaded(VIEW);

@@ -152,9 +152,9 @@ describe('positionFromPoint', () => {
     const [x, y] = pageOf(element, [1, 0, 0]);
     const taps = new Taps();
     let picks = 0;
-    const { stage } = element as unknown as { stage: { positionFromPoint: () => Promise<unknown> } };
-    const ask = stage.positionFromPoint.bind(stage);
-    stage.positionFromPoint = (...place) => (picks++, ask(...place));
+    const { core } = element as unknown as { core: { positionFromPoint: () => Promise<unknown> } };
+    const ask = core.positionFromPoint.bind(core);
+    core.positionFromPoint = (...place) => (picks++, ask(...place));
     await taps.tap(x, y);
     await taps.tap(x, y);
     await delay(400);

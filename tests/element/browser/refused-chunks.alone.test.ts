@@ -12,7 +12,7 @@ const GENERATORS = '/tests/fixtures/generators/';
 /** Chunks that this page cannot ask for, and why. */
 const NOT_ASKED: Readonly<Record<string, string>> = {
   'no-device': 'errors of browsers without WebGPU: tests/element/browser/device.test.ts',
-  'come-back': 'no device comes back: tests/stability/browser',
+  'device-recovery': 'no device comes back: tests/stability/browser',
   search: 'depends on what an earlier visit has kept',
   refusal: 'a page that refuses workers: tests/element/browser/cdn.test.ts',
   meshopt_decoder: 'compressed meshes',

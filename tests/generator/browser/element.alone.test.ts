@@ -40,7 +40,7 @@ describe('a generator in the element', () => {
   it('no other scene fetches the runtime or the code for generators', async () => {
     await showLoaded({ src: COMPASS });
     assertEqual(
-      [resources('onnxruntime-web'), resources('open-live-model'), resources('packages/generator')].slice(0, 2),
+      [resources('onnxruntime-web'), resources('open-dynamic-model'), resources('packages/generator')].slice(0, 2),
       [0, 0],
     );
   });

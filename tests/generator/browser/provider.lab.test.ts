@@ -4,7 +4,7 @@ import { ImageTensor } from '@gaussian-splat/renderer';
 import { bindInputs, openModel, PostProcessor, type GeneratorState } from '@gaussian-splat/generator';
 import type * as FirstRun from '../../../packages/generator/dist/runtime/first-run.js';
 import type * as LoadRuntime from '../../../packages/generator/dist/runtime/load-runtime.js';
-import type * as LiveSessionModule from '../../../packages/generator/dist/runtime/live-session.js';
+import type * as LiveSessionModule from '../../../packages/generator/dist/runtime/ort-session.js';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import { CAMERA, FIXTURES, makeDevice, numbersOf, readBuffer, relativeError, runOnCpu } from './support.js';
 
@@ -13,14 +13,14 @@ const BUILT = '/packages/generator/dist/runtime/';
 
 let device: GPUDevice;
 let loadRuntime: typeof LoadRuntime.loadRuntime;
-let LiveSession: typeof LiveSessionModule.LiveSession;
+let OrtSession: typeof LiveSessionModule.OrtSession;
 let copyOf: typeof FirstRun.copyOf;
 
 before(async () => {
   device = await makeDevice();
   ({ loadRuntime } = (await import(`${BUILT}load-runtime.js`)) as typeof LoadRuntime);
   ({ copyOf } = (await import(`${BUILT}first-run.js`)) as typeof FirstRun);
-  ({ LiveSession } = (await import(`${BUILT}live-session.js`)) as typeof LiveSessionModule);
+  ({ OrtSession } = (await import(`${BUILT}ort-session.js`)) as typeof LiveSessionModule);
 });
 
 const wave = (length: number, step: number): number[] => Array.from({ length }, (_, i) => 0.3 * Math.sin(i + step));
@@ -39,7 +39,7 @@ it('casts of 16-bit integers cannot even be loaded: what the check says of them 
   const packed = await openModel({ url: `${FIXTURES}packed.onnx` });
   const model = { ...packed, url, bytes };
   for (const kind of ['webgpu', 'wasm'] as const) {
-    const failure = await LiveSession.create(kind, await loadRuntime(), model, device).then(
+    const failure = await OrtSession.create(kind, await loadRuntime(), model, device).then(
       () => 'none',
       (error: unknown) => String(error),
     );
@@ -68,7 +68,7 @@ describe('recorded commands', () => {
       const constants = constantOutputs(model.header);
       const fixed: LiveSessionModule.FixedOutputs = {};
       for (const kind of ['webgpu', 'captured'] as const) {
-        const session = await LiveSession.create(kind, runtime, model, device, kind === 'captured' ? fixed : {});
+        const session = await OrtSession.create(kind, runtime, model, device, kind === 'captured' ? fixed : {});
         written[kind] = [];
         // Back to an earlier state in the end: a replay must depend on nothing but its inputs.
         for (const step of [0, 1, 2, 3, 1, 0]) {
@@ -98,7 +98,7 @@ describe('recorded commands', () => {
 /** What the WebGPU provider writes, whatever we think of it. */
 async function onProvider(url: string, image: ImageTensor): Promise<number[]> {
   const model = await openModel({ url });
-  const session = await LiveSession.create('webgpu', await loadRuntime(), model, device);
+  const session = await OrtSession.create('webgpu', await loadRuntime(), model, device);
   let reading: Promise<Uint8Array> | undefined;
   await session.run({ image }, ({ tensors }) => (reading = readBuffer(device, tensors.out)));
   await session.release();

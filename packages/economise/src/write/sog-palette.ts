@@ -27,9 +27,9 @@ export interface RoundedPalette {
 /** Quantizes palette entries, each according to its visibility, optimized for the most visible splat that uses it. */
 export function roundPalette(
   { entries, labels, size }: Palette,
-  told: { order: Uint32Array; weights: Float32Array; seen: SeenSplats | undefined; step: number },
+  targets: { order: Uint32Array; weights: Float32Array; seen: SeenSplats | undefined; step: number },
 ): RoundedPalette {
-  const { order, weights, seen, step } = told;
+  const { order, weights, seen, step } = targets;
   const width = entries.length / size;
   const sums = new Float32Array(size);
   const heaviest = new Uint32Array(size);

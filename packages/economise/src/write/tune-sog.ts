@@ -43,8 +43,8 @@ export function tuneSog(encodeWebp: EncodeWebp | undefined, isStreamed = false):
 
 function tunedSog(options: SogOptions, hasHarmonics: boolean, isStreamed: boolean): Encoding {
   const { steps, palette, seen } = options;
-  const told = Object.entries(steps).filter(([name]) => hasHarmonics || name !== 'harmonics');
-  const list = told.map(([name, step]) => `${name} ${step.toPrecision(2)}`).join(', ');
+  const applicable = Object.entries(steps).filter(([name]) => hasHarmonics || name !== 'harmonics');
+  const list = applicable.map(([name, step]) => `${name} ${step.toPrecision(2)}`).join(', ');
   const title = `SOG version 2, steps ${list}${hasHarmonics ? `, palette ${palette}` : ''}`;
   return {
     title: `${isStreamed ? 'streamed ' : ''}${title}`,

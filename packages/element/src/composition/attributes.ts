@@ -4,7 +4,7 @@
  */
 import { bareKeyword, flag, read, text, type Attribute } from '../attributes.js';
 import { upGrammar } from '../camera/grammar.js';
-import type { Numbers } from '../live/values.js';
+import type { Numbers } from '../dynamic/values.js';
 import { anglesGrammar, boxGrammar, opacityGrammar, pointGrammar, scaleGrammar } from './grammar.js';
 
 /** Attributes of both. */

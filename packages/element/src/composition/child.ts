@@ -6,12 +6,12 @@ import { readAttribute } from '../camera/grammar.js';
 import { notPlayed } from '../controllers/playback-controller.js';
 import type { ElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
-import type { LiveState } from '../live/live-model.js';
+import type { DynamicState } from '../dynamic/dynamic-model.js';
 import { frameOf } from '../camera/settings.js';
-import type { Source } from '../stage-host.js';
+import type { Source } from '../element-host.js';
 import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
-import type { Member } from '../member.js';
-import { SourceEntry, type EntryStage, type SourceOwner } from '../source-entry.js';
+import type { WorldEntry } from '../world-entry.js';
+import { SourceEntry, type EntryCore, type SourceOwner } from '../source-entry.js';
 import { cameraInScene, isSolid, matrixOf, matrixOfFrame, readMatrix, sceneToWorld, transposed } from './placing.js';
 import { Lazy } from '../lazy.js';
 import type { Interaction, InteractionHost, ScenePointerEvent } from './interaction.js';
@@ -34,7 +34,7 @@ export interface ChildPlace {
 
 /** Convention of glTF. */
 const UP: Vector3 = [0, 1, 0];
-const NO_VALUES: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
+const NO_VALUES: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
 
 /** Events of a child of `<gaussian-splat>`, with the same meanings as there. Only those of pointers bubble. */
 export type ChildEventMap = Record<
@@ -62,7 +62,7 @@ export type SettableOf<Table> = Partial<
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export abstract class SplatChild extends ReactiveElement implements SourceOwner {
   /** Its entry in the sources of its `<gaussian-splat>`. @internal */
-  readonly holder = new SourceEntry(this);
+  readonly entry = new SourceEntry(this);
   /** @internal */
   protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
   readonly #warned = new Set<string>();
@@ -83,7 +83,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
 
   /** Whether it is shown. */
   get loaded(): boolean {
-    return this.holder.state === 'ready';
+    return this.entry.state === 'ready';
   }
 
   /**
@@ -91,22 +91,22 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
    * it has no source.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.holder.scene.settled);
+    return this.updateComplete.then(() => this.entry.scene.settled);
   }
 
   /** Reason that it is not shown, or null. */
   get error(): ElementError | null {
-    return this.holder.error;
+    return this.entry.error;
   }
 
   /** Loading progress, 0..1. */
   get progress(): number {
-    return this.loaded ? 1 : (this.holder.progress ?? 0);
+    return this.loaded ? 1 : (this.entry.progress ?? 0);
   }
 
   /** Loads it again, as if `src` had just been set. */
   load(): void {
-    this.holder.reload();
+    this.entry.reload();
   }
 
   /**
@@ -114,34 +114,34 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
    * their `<gaussian-splat>`.
    */
   get currentTime(): number {
-    return this.holder.playback.currentTime;
+    return this.entry.playback.currentTime;
   }
 
   set currentTime(seconds: number) {
     if (seconds === null || seconds === undefined) return;
     this.#drive();
-    this.holder.playback.currentTime = seconds;
+    this.entry.playback.currentTime = seconds;
   }
 
   /** Duration in seconds; NaN if nothing is animated, Infinity without an end. */
   get duration(): number {
-    return this.holder.duration;
+    return this.entry.duration;
   }
 
   /** Whether playback is paused. */
   get paused(): boolean {
-    return this.holder.playback.paused;
+    return this.entry.playback.paused;
   }
 
   /** Speed of its own clock; 1 is real time. */
   get playbackRate(): number {
-    return this.holder.playback.playbackRate;
+    return this.entry.playback.playbackRate;
   }
 
   set playbackRate(rate: number) {
     if (rate === null || rate === undefined) return;
     this.#drive();
-    this.holder.playback.playbackRate = rate;
+    this.entry.playback.playbackRate = rate;
   }
 
   /**
@@ -151,7 +151,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
    */
   async play(): Promise<void> {
     this.#drive();
-    const { playback } = this.holder;
+    const { playback } = this.entry;
     const { pauses } = playback;
     await this.updateComplete;
     if (playback.pauses !== pauses) throw notPlayed();
@@ -163,13 +163,13 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   /** Pauses playback. */
   pause(): void {
     this.#drive();
-    this.holder.playback.pause();
+    this.entry.playback.pause();
   }
 
   /** It has its own clock from here on. */
   #drive(): void {
     this.#isDriven = true;
-    this.holder.hasBegun = true;
+    this.entry.hasBegun = true;
   }
 
   /** Whether it has its own clock: it has `autoplay` or `loop`, or a script has controlled its playback. @internal */
@@ -181,7 +181,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   abstract get source(): Source;
 
   /** @internal */
-  get liveValues(): Omit<LiveState, 'timeSeconds'> {
+  get dynamicValues(): Omit<DynamicState, 'timeSeconds'> {
     return NO_VALUES;
   }
 
@@ -198,7 +198,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /** @internal */
-  place({ scene, placement }: Member, { frame }: EntryStage): void {
+  place({ scene, placement }: WorldEntry, { frame }: EntryCore): void {
     const { placed, up, opacity, crop, hidden } = this.#placed;
     placement.visible = !hidden && isSolid(placed);
     if (placement.visible) placement.sceneToWorld = sceneToWorld(frame, placed, frameOf({ up }, scene.bounds));
@@ -207,7 +207,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /** @internal */
-  seenFrom(camera: Camera, member: Member | undefined, { frame }: EntryStage): Camera {
+  seenFrom(camera: Camera, member: WorldEntry | undefined, { frame }: EntryCore): Camera {
     const { placed, up } = this.#placed;
     // Its future transform, before it is loaded.
     const matrix = member?.placement.sceneToWorld ?? sceneToWorld(frame, placed, frameOf({ up }, {}));
@@ -215,7 +215,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   /** From the coordinates of its own children, y up, to the world. @internal */
-  frameToWorld({ scene, placement }: Member): Matrix4 {
+  frameToWorld({ scene, placement }: WorldEntry): Matrix4 {
     const own = transposed(matrixOfFrame(frameOf({ up: this.#placed.up }, scene.bounds)));
     return placement.sceneToWorld ? multiply(placement.sceneToWorld, own) : own;
   }
@@ -272,7 +272,7 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
     // If it moves with its parent element, its state stays, and ends with that of the parent.
-    if (this.parentElement !== this.holder.parent) this.holder.attach(null);
+    if (this.parentElement !== this.entry.parent) this.entry.attach(null);
   }
 
   /** It renders nothing itself. */
@@ -281,8 +281,8 @@ export abstract class SplatChild extends ReactiveElement implements SourceOwner 
   }
 
   protected override updated(): void {
-    this.holder.update();
-    this.holder.requestFrame();
+    this.entry.update();
+    this.entry.requestFrame();
     interactionChanged(this);
   }
 }
@@ -314,24 +314,24 @@ export const childDeclarations = (
 });
 
 /** Interface of the parent element for children. */
-export type ChildStage = EntryStage & InteractionHost;
+export type ChildCore = EntryCore & InteractionHost;
 
 /** Cores of elements with children. */
-export const stages = new WeakMap<Element, ChildStage>();
+export const cores = new WeakMap<Element, ChildCore>();
 
 const interactions = new WeakMap<Element, Lazy<Interaction>>();
 
 /** Enables clicks on the children of an element, once one of them is interactive. */
 function interactionChanged(child: SplatChild): void {
   const parent = child.parentElement;
-  const stage = parent && stages.get(parent);
-  if (!stage) return;
+  const core = parent && cores.get(parent);
+  if (!core) return;
   let code = interactions.get(parent);
   if (code === undefined) {
     if (!child.interactive) return;
     code = new Lazy('the code of clicks on scenes', async () => {
       const { Interaction } = await import('./interaction.js');
-      return new Interaction(stage);
+      return new Interaction(core);
     });
     interactions.set(parent, code);
   }
@@ -344,5 +344,5 @@ export function adopt(child: SplatChild): void {
   const { parentElement } = child;
   // Its first update may precede the setup of its parent.
   interactionChanged(child);
-  child.holder.attach((parentElement && stages.get(parentElement)) ?? null);
+  child.entry.attach((parentElement && cores.get(parentElement)) ?? null);
 }

@@ -1,5 +1,5 @@
 /** Loaded when an element gets its first child with a scene or a mesh. */
-import { adopt, SplatChild, stages, type ChildStage } from './child.js';
+import { adopt, SplatChild, cores, type ChildCore } from './child.js';
 import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
 
@@ -11,8 +11,8 @@ export function define(): void {
 }
 
 /** Enables children of an element. */
-export function compose(stage: ChildStage): void {
-  stages.set(stage.element, stage);
+export function compose(core: ChildCore): void {
+  cores.set(core.element, core);
   define();
-  for (const child of stage.element.children) if (child instanceof SplatChild) adopt(child);
+  for (const child of core.element.children) if (child instanceof SplatChild) adopt(child);
 }

@@ -196,14 +196,14 @@ export class Interaction {
     if (child === before) return;
     this.#over = child;
     if (this.#surface) this.#surface.style.cursor = child ? child.style.cursor || 'pointer' : '';
-    const tell = (target: SplatChild | null, types: readonly [string, string], relatedTarget: Element): void => {
+    const notify = (target: SplatChild | null, types: readonly [string, string], relatedTarget: Element): void => {
       const init = { ...(event ? initOf(event) : BUBBLES), relatedTarget, cancelable: false };
       types.forEach((type, i) =>
         target?.dispatchEvent(new ScenePointerEvent(type, { ...init, bubbles: i === 0 }, hit)),
       );
     };
-    tell(before, ['pointerout', 'pointerleave'], child ?? this.#of.element);
-    tell(child, ['pointerover', 'pointerenter'], before ?? this.#of.element);
+    notify(before, ['pointerout', 'pointerleave'], child ?? this.#of.element);
+    notify(child, ['pointerover', 'pointerenter'], before ?? this.#of.element);
   }
 
   #placeFocused(): void {
@@ -213,7 +213,7 @@ export class Interaction {
   /** Positions the button of a child around it, so that its outline shows the keyboard focus. */
   #place(child: SplatChild, button: HTMLButtonElement): void {
     const { drawnFrom: camera, surface } = this.#of;
-    const placement = child.holder.member?.placement;
+    const placement = child.entry.member?.placement;
     const bounds = placement && boundsOfWorld({ placements: [placement] });
     if (!camera || !bounds || !surface) return;
     const corners = Array.from({ length: 8 }, (_, k) => {

@@ -1,7 +1,7 @@
 import { loadModule } from '@gaussian-splat/core';
 import type { PropertyDeclarations } from 'lit';
 import type { openGaussians } from '../gpu/open-scene.js';
-import type { Source } from '../stage-host.js';
+import type { Source } from '../element-host.js';
 import { MESH_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import { childDeclarations, SplatChild } from './child.js';
 

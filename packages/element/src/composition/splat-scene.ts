@@ -1,8 +1,8 @@
 import type { PropertyDeclarations } from 'lit';
-import type { Source } from '../stage-host.js';
-import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../live/values.js';
-import type { GeneratorInput } from '../live/inputs.js';
-import type { LiveState } from '../live/live-model.js';
+import type { Source } from '../element-host.js';
+import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../dynamic/values.js';
+import type { GeneratorInput } from '../dynamic/inputs.js';
+import type { DynamicState } from '../dynamic/dynamic-model.js';
 import { SCENE_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
 
@@ -52,17 +52,17 @@ export class SplatSceneElement extends SplatChild {
    */
   declare inputValues: ControlValues | null;
   protected readonly table = SCENE_ATTRIBUTES;
-  #liveValues: Omit<LiveState, 'timeSeconds'> | undefined;
+  #dynamicValues: Omit<DynamicState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;
 
   /** Inputs of its generators that the page may set, same as on `<gaussian-splat>`; `inputs-change` reports changes. */
   get inputs(): readonly GeneratorInput[] {
-    return this.holder.inputs;
+    return this.entry.inputs;
   }
 
   /** @internal */
-  override get liveValues(): Omit<LiveState, 'timeSeconds'> {
-    return (this.#liveValues ??= this.#readLiveValues());
+  override get dynamicValues(): Omit<DynamicState, 'timeSeconds'> {
+    return (this.#dynamicValues ??= this.#readDynamicValues());
   }
 
   /** @internal */
@@ -76,8 +76,8 @@ export class SplatSceneElement extends SplatChild {
     this.#observer ??= new MutationObserver((records) => {
       if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
       this.requestUpdate();
-      this.#liveValues = undefined;
-      this.holder.requestFrame();
+      this.#dynamicValues = undefined;
+      this.entry.requestFrame();
     });
     this.#observer.observe(this, { attributes: true });
   }
@@ -89,7 +89,7 @@ export class SplatSceneElement extends SplatChild {
 
   protected override willUpdate(): void {
     super.willUpdate();
-    this.#liveValues = undefined;
+    this.#dynamicValues = undefined;
   }
 
   protected override readPlace(): ChildPlace {
@@ -102,7 +102,7 @@ export class SplatSceneElement extends SplatChild {
     };
   }
 
-  #readLiveValues(): Omit<LiveState, 'timeSeconds'> {
+  #readDynamicValues(): Omit<DynamicState, 'timeSeconds'> {
     const pose = readNumbers(this.pose);
     if (pose === undefined && this.pose) this.warn('<splat-scene>: pose expects numbers; the rest pose counts.');
     return { pose, ...readControls(this.attributes, this.inputValues, (sentence) => this.warn(sentence)) };

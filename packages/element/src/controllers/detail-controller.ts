@@ -1,10 +1,10 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { Attributes, DetailChoice } from '../attributes.js';
 import type { LoadedGaussians, OwnedGaussians } from '../gpu/loaded-gaussians.js';
-import type { LodSettings } from '../gpu/painter.js';
+import type { LodSettings } from '../gpu/backend.js';
 import { buildLevels } from '../detail/build-levels.js';
 import { LatestTask } from '../latest-task.js';
-import type { Services } from '../stage-host.js';
+import type { Services } from '../element-host.js';
 
 /**
  * Minimum number of splats for building levels automatically: in smaller scenes the number of splats is not the

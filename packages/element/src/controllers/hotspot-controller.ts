@@ -100,7 +100,7 @@ export class HotspotController implements ReactiveController {
   /** Boxes of the labels, by their elements. */
   readonly #boxes = new WeakMap<Element, LabelBox>();
   /** Last visibility reported to each label. */
-  readonly #told = new WeakMap<HTMLElement, boolean>();
+  readonly #reported = new WeakMap<HTMLElement, boolean>();
   #isProbing = false;
   #isStale = false;
 
@@ -227,7 +227,7 @@ export class HotspotController implements ReactiveController {
       else box.remove();
       // Part of a label whose point has left the frame may still be readable.
       box.show(isOpen, hasPanel);
-      this.#tell(hotspot, isOpen && x >= 0 && y >= 0 && x <= width && y <= height);
+      this.#notify(hotspot, isOpen && x >= 0 && y >= 0 && x <= width && y <= height);
     }
   }
 
@@ -237,11 +237,11 @@ export class HotspotController implements ReactiveController {
     return box;
   }
 
-  #tell(hotspot: Hotspot, isVisible: boolean): void {
+  #notify(hotspot: Hotspot, isVisible: boolean): void {
     hotspot.isVisible = isVisible;
     for (const element of hotspot.elements) {
-      if (this.#told.get(element) === isVisible) continue;
-      this.#told.set(element, isVisible);
+      if (this.#reported.get(element) === isVisible) continue;
+      this.#reported.set(element, isVisible);
       const { visibilityAttribute } = element.dataset;
       if (visibilityAttribute) element.toggleAttribute(`data-${visibilityAttribute}`, isVisible);
       element.dispatchEvent(new CustomEvent('hotspot-visibility', { detail: { visible: isVisible } }));

@@ -1,14 +1,14 @@
 import { loadModule } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
-import type * as comeBack from '../gpu/come-back.js';
+import type * as comeBack from '../gpu/device-recovery.js';
 import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { isStreamed, openScene, type openGaussians, type OpenOptions } from '../gpu/open-scene.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { LatestTask } from '../latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
-import type { Services } from '../stage-host.js';
+import type { Services } from '../element-host.js';
 import { timerMs } from '../attributes.js';
 
 /** `waiting`: there is a scene to load, but the element has not entered the viewport yet. */
@@ -25,7 +25,7 @@ export interface SceneHost {
   /** Upper limit of the scene's GPU memory in bytes. */
   readonly memoryBudget: number | undefined;
   /** Additional data of a request for a generator. */
-  readonly liveRequest: ReturnType<OpenOptions['live']>;
+  readonly dynamicRequest: ReturnType<OpenOptions['live']>;
   /** Opens sources other than scenes of splats. */
   readonly open?: typeof openGaussians;
   /** Shows a scene; resolves once its first frame is drawn. */
@@ -43,7 +43,7 @@ export interface SceneHost {
   contextChanged(event: 'contextlost' | 'contextrestored'): void;
 }
 
-type DeviceBack = (typeof comeBack)['deviceBack'];
+type DeviceBack = (typeof comeBack)['waitForDevice'];
 
 /** The state when no more devices are requested. */
 interface GivenUp {
@@ -219,7 +219,7 @@ export class SceneController implements ReactiveController {
     if (loaded !== total) report(loaded, loaded);
     this.#setState('ready');
     this.#of.loaded(request.url);
-    this.#tellRestored();
+    this.#notifyRestored();
     void this.#refine();
   }
 
@@ -251,7 +251,7 @@ export class SceneController implements ReactiveController {
     await pageVisible(signal);
     if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined, loss);
     if (signal.aborted || this.#scene === null) return;
-    this.#tellRestored();
+    this.#notifyRestored();
     void this.#refine();
   }
 
@@ -261,26 +261,26 @@ export class SceneController implements ReactiveController {
    */
   async #giveUp(request: SceneRequest, { signal: given, error, loss, mayReturn }: GivenUp): Promise<void> {
     try {
-      const { deviceBack, unrecoverable } = await loadModule(
+      const { waitForDevice, unrecoverable } = await loadModule(
         'the code for lost devices',
-        () => import('../gpu/come-back.js'),
+        () => import('../gpu/device-recovery.js'),
       );
       if (given.aborted) return;
       this.fail(unrecoverable(error, loss), this.isOutgoing);
-      if (mayReturn) void this.#comeBack(request, deviceBack);
+      if (mayReturn) void this.#comeBack(request, waitForDevice);
     } catch (missing) {
       if (!given.aborted) this.fail(missing);
     }
   }
 
-  async #comeBack(request: SceneRequest, deviceBack: DeviceBack): Promise<void> {
-    const lease = await deviceBack(this.#of.services.sharedDevice, this.#running.signal);
+  async #comeBack(request: SceneRequest, waitForDevice: DeviceBack): Promise<void> {
+    const lease = await waitForDevice(this.#of.services.sharedDevice, this.#running.signal);
     if (lease === undefined) return;
     this.#error = null;
     await this.#load(request).finally(() => lease.release());
   }
 
-  #tellRestored(): void {
+  #notifyRestored(): void {
     if (!this.#isContextLost) return;
     this.#isContextLost = false;
     this.#of.contextChanged('contextrestored');
@@ -329,7 +329,7 @@ export class SceneController implements ReactiveController {
       device: services.sharedDevice,
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
-      live: () => this.#of.liveRequest,
+      live: () => this.#of.dynamicRequest,
       ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
     }).finally(() => this.#setReleasable(false));
     if (signal.aborted) return scene.destroy();

@@ -1,7 +1,7 @@
 import type { Attributes } from '../attributes.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import { Addresses } from '../source-request.js';
-import type { Services, Source } from '../stage-host.js';
+import type { Services, Source } from '../element-host.js';
 import type { SceneController } from './scene-controller.js';
 
 export interface SourceHost {

@@ -3,14 +3,14 @@ import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { targetMsOf, type FrameClient, type FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { CanvasFrame, Contents, Drawable, Painter, Place, Surface } from '../gpu/painter.js';
+import type { CanvasFrame, FrameSource, Drawable, Backend, DeviceOwner, Surface } from '../gpu/backend.js';
 import { why } from '../gpu/request-device.js';
 import type { CameraController } from './camera-controller.js';
 import type * as dynamicQuality from './dynamic-quality-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** Interface of the element for frames. */
-export interface ViewHost extends Contents {
+export interface ViewHost extends FrameSource {
   readonly attributes: Pick<
     Attributes,
     'quality' | 'maxShDegree' | 'order' | 'filter' | 'maxPixelRatio' | 'frameBudget'
@@ -38,7 +38,7 @@ export interface ViewHost extends Contents {
   drawingFailed(error: unknown): void;
 }
 
-interface Settle {
+interface MotionEnd {
   readonly resolve: () => void;
   readonly reject: (reason: unknown) => void;
 }
@@ -56,12 +56,12 @@ const PREPARE_AFTER_MS = 300;
 export class ViewController implements FrameClient {
   readonly #host: ViewHost;
   #ownPace: dynamicQuality.DynamicQualityController | undefined;
-  #painter: Painter | null = null;
+  #backend: Backend | null = null;
   /** The current surface, and its device. */
   #surface: Surface | null = null;
-  #surfaceOf: Place['context'] | null = null;
+  #surfaceOf: DeviceOwner['context'] | null = null;
   /** Waits for the first frame of a new scene, which is drawn even off-screen. */
-  #first: Settle | undefined;
+  #first: MotionEnd | undefined;
   #drawnContent = '';
   #preparing: ReturnType<typeof setTimeout> | undefined;
 
@@ -79,7 +79,7 @@ export class ViewController implements FrameClient {
         scheduler: () => host.scheduler,
         frameBudget: () => host.attributes.frameBudget,
         requestFrame: () => this.requestFrame(),
-        mayFade: () => !this.#painter?.filter,
+        mayFade: () => !this.#backend?.filter,
         onFrameTimed: (isWhole) => host.reportMotionFrame(isWhole),
       }));
   }
@@ -109,8 +109,8 @@ export class ViewController implements FrameClient {
   }
 
   /** The backend of frames; null without one. */
-  get painter(): Painter | null {
-    return this.#painter;
+  get backend(): Backend | null {
+    return this.#backend;
   }
 
   /**
@@ -118,13 +118,13 @@ export class ViewController implements FrameClient {
    * no pixel to draw; rejects with GaussianSplatError `out-of-memory/*`.
    */
   show(scene: Drawable): Promise<void> {
-    if (scene.place.context !== this.#painter?.place.context) {
-      this.#painter?.destroy();
-      const painter = scene.openPainter(this.#host, {
+    if (scene.place.context !== this.#backend?.place.context) {
+      this.#backend?.destroy();
+      const backend = scene.openBackend(this.#host, {
         onIncomplete: () => this.requestFrame(),
-        onError: (error) => this.#painter === painter && this.#host.drawingFailed(error),
+        onError: (error) => this.#backend === backend && this.#host.drawingFailed(error),
       });
-      this.#painter = painter;
+      this.#backend = backend;
     }
     this.#pace?.reset();
     return new Promise((resolve, reject) => {
@@ -135,8 +135,8 @@ export class ViewController implements FrameClient {
 
   /** Stops drawing. The last frame stays, so that the next scene can replace it without a gap. */
   pause(): void {
-    this.#painter?.destroy();
-    this.#painter = null;
+    this.#backend?.destroy();
+    this.#backend = null;
     // Resolves pending waits.
     this.#first?.resolve();
     this.#first = undefined;
@@ -161,21 +161,21 @@ export class ViewController implements FrameClient {
   }
 
   drawFrame(now: number): void {
-    const painter = this.#painter;
+    const backend = this.#backend;
     // It may have left the viewport since the request.
-    if (painter === null || !this.#isDrawable) return;
+    if (backend === null || !this.#isDrawable) return;
     const { camera } = this.#host;
-    const pixels = this.#pixelsOf(painter);
+    const pixels = this.#pixelsOf(backend);
     // Nothing is drawn without a size; the size observer requests a frame when there is one.
     if (pixels === null) return this.#finishUnseen();
     this.#host.beforeFrame(now);
     const source = camera.step(now, this.#host.decayMs);
     try {
-      const request = this.#frameRequest(painter, pixels);
+      const request = this.#frameRequest(backend, pixels);
       if (request === null)
         return void why(({ noContext }) => noContext()).then((error) => this.#host.drawingFailed(error));
       this.#host.advanceScene(request.camera, now);
-      this.#render(painter, request, now, source !== null);
+      this.#render(backend, request, now, source !== null);
       this.#host.afterFrame(request.camera);
     } catch (error) {
       return this.#host.drawingFailed(error);
@@ -192,15 +192,15 @@ export class ViewController implements FrameClient {
    * @returns The canvas, or null if there is nothing to draw.
    */
   drawNow(size?: PixelSize, background?: CanvasFrame['background']): HTMLCanvasElement | null {
-    const painter = this.#painter;
+    const backend = this.#backend;
     const canvas = this.#host.canvas;
-    if (painter === null || painter.isLost || this.#first !== undefined || canvas === null) return null;
-    const own = this.#pixelsOf(painter);
+    if (backend === null || backend.isLost || this.#first !== undefined || canvas === null) return null;
+    const own = this.#pixelsOf(backend);
     if (own === null) return null;
-    this.#applyRendering(painter);
-    const request = this.#frameRequest(painter, size ?? own);
+    this.#applyRendering(backend);
+    const request = this.#frameRequest(backend, size ?? own);
     if (request === null) return null;
-    painter.render({ ...request, background, isRead: true }, this.#host.prepareFrame());
+    backend.render({ ...request, background, isRead: true }, this.#host.prepareFrame());
     return request.surface.canvas as HTMLCanvasElement;
   }
 
@@ -210,63 +210,63 @@ export class ViewController implements FrameClient {
    */
   get #isDrawable(): boolean {
     const { canvas, isVisible } = this.#host;
-    if (this.#painter?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
+    if (this.#backend?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
     return this.#first !== undefined || isVisible;
   }
 
   /** null without a size. */
-  #pixelsOf({ place }: Painter): PixelSize | null {
+  #pixelsOf({ place }: Backend): PixelSize | null {
     const { size, attributes } = this.#host;
     return size.pixelSize(attributes.maxPixelRatio, place.limits.maxTextureDimension2D);
   }
 
-  #render(painter: Painter, request: CanvasFrame, now: number, cameraMoved: boolean): void {
+  #render(backend: Backend, request: CanvasFrame, now: number, cameraMoved: boolean): void {
     const first = this.#first;
     this.#first = undefined;
-    this.#applyRendering(painter);
+    this.#applyRendering(backend);
     const content = this.#host.prepareFrame();
     const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
     this.#drawnContent = content;
     if (first !== undefined) {
-      painter.renderFirst(request, content).then(() => this.#afterFirst(painter, first), first.reject);
+      backend.renderFirst(request, content).then(() => this.#afterFirst(backend, first), first.reject);
       return;
     }
     const pixels = request.camera.width * request.camera.height;
     const occasion = { now, pixels, hasChanged, goesOn: this.#host.camera.isMoving };
     const draw: dynamicQuality.DrawFrame = (settings, onTime) =>
-      painter.render({ ...request, settings }, content, onTime);
+      backend.render({ ...request, settings }, content, onTime);
     if (this.#pace) this.#pace.draw(occasion, this.#host.canvas!, draw);
     else draw(undefined);
-    this.#prepareSoon(painter);
+    this.#prepareSoon(backend);
   }
 
-  #afterFirst(painter: Painter, { resolve }: Settle): void {
+  #afterFirst(backend: Backend, { resolve }: MotionEnd): void {
     resolve();
-    this.#prepareSoon(painter);
+    this.#prepareSoon(backend);
   }
 
   /**
    * Frames in motion must not wait for pipelines: these are compiled soon after the first frame, and after the quality
    * changes to `auto`.
    */
-  #prepareSoon(painter: Painter): void {
+  #prepareSoon(backend: Backend): void {
     if (!this.#isAuto) return;
     quality.want();
-    if (painter.isPrepared) return;
+    if (backend.isPrepared) return;
     this.#preparing ??= setTimeout(() => {
       void quality.settled.then(() => {
         this.#preparing = undefined;
-        if (this.#painter === painter && quality.value) painter.prepare(quality.value.MOVING_SETTINGS);
+        if (this.#backend === backend && quality.value) backend.prepare(quality.value.MOVING_SETTINGS);
       });
     }, PREPARE_AFTER_MS);
   }
 
-  #applyRendering(painter: Painter): void {
+  #applyRendering(backend: Backend): void {
     const { quality, maxShDegree: shDegree, filter, order: choice } = this.#host.attributes;
     const trainedOrder = this.#host.shown.some(({ order }) => order) ? 'pixel' : 'center';
     const order = choice === 'auto' ? trainedOrder : choice;
     const trained = filter === 'auto' ? undefined : filter;
-    painter.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, order, filter: trained });
+    backend.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, order, filter: trained });
   }
 
   #finishUnseen(): void {
@@ -275,8 +275,8 @@ export class ViewController implements FrameClient {
     this.#first = undefined;
   }
 
-  #frameRequest(painter: Painter, { width, height }: PixelSize): CanvasFrame | null {
-    const surface = this.#surfaceFor(painter);
+  #frameRequest(backend: Backend, { width, height }: PixelSize): CanvasFrame | null {
+    const surface = this.#surfaceFor(backend);
     if (surface === null) return null;
     const { canvas } = surface;
     // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
@@ -286,14 +286,14 @@ export class ViewController implements FrameClient {
   }
 
   /** null if the browser does not support the context on this canvas. */
-  #surfaceFor(painter: Painter): Surface | null {
-    const take = (): Surface | null => (this.#surface = painter.surfaceOn(this.#host.canvas!));
-    if (this.#surfaceOf !== painter.place.context && take() === null) {
+  #surfaceFor(backend: Backend): Surface | null {
+    const take = (): Surface | null => (this.#surface = backend.surfaceOn(this.#host.canvas!));
+    if (this.#surfaceOf !== backend.place.context && take() === null) {
       // A canvas keeps its first kind of context.
       this.renewCanvas();
       take();
     }
-    this.#surfaceOf = painter.place.context;
+    this.#surfaceOf = backend.place.context;
     return this.#surface;
   }
 }

@@ -16,7 +16,7 @@ import type { MotionHost } from '../controllers/motion-controller.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { Member } from '../member.js';
+import type { WorldEntry } from '../world-entry.js';
 import type { SourceEntry } from '../source-entry.js';
 import { defineCuts } from './define.js';
 import { NO_REVEAL, parseReveal, revealedBy, REVEAL_FORM, type RevealEffect } from './reveal.js';
@@ -50,7 +50,7 @@ export class Effects implements Mover {
   /** Compilation of the current shader by device. */
   #programs = new WeakMap<GPUDevice, SplatProgram>();
   readonly #compiling = new WeakMap<GPUDevice, Promise<void>>();
-  readonly #modifiers = new Map<Member, SplatModifier>();
+  readonly #modifiers = new Map<WorldEntry, SplatModifier>();
   #cuts: readonly SplatCutElement[] | undefined;
   #shader: SplatShader | null = null;
   #refused: SplatShader | null = null;
@@ -168,7 +168,7 @@ export class Effects implements Mover {
       .flatMap(({ cut }) => (cut ? [inWorld(cut, toWorld)] : []));
   }
 
-  #modify(member: Member, element: HTMLElement, shared: SplatChanges): void {
+  #modify(member: WorldEntry, element: HTMLElement, shared: SplatChanges): void {
     const { placement, scene } = member;
     const isChild = element !== this.#host.element && element instanceof SplatChild;
     const own = isChild ? this.#cutsOf(element, element.frameToWorld(member)) : [];
@@ -190,7 +190,7 @@ export class Effects implements Mover {
     if (modifier.write(changes, placement) || placement.modifier !== modifier) placement.modifier = modifier;
   }
 
-  #forget(member: Member, modifier: SplatModifier): void {
+  #forget(member: WorldEntry, modifier: SplatModifier): void {
     this.#modifiers.delete(member);
     if (member.placement.modifier === modifier) member.placement.modifier = undefined;
     modifier.destroy();

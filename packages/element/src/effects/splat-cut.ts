@@ -60,12 +60,12 @@ export class SplatCutElement extends ReactiveElement {
   override connectedCallback(): void {
     super.connectedCallback();
     this.#shower = this.closest('gaussian-splat');
-    this.#tell();
+    this.#notify();
   }
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    this.#tell();
+    this.#notify();
     this.#shower = null;
   }
 
@@ -76,10 +76,10 @@ export class SplatCutElement extends ReactiveElement {
 
   protected override updated(): void {
     this.#cut = undefined;
-    this.#tell();
+    this.#notify();
   }
 
-  #tell(): void {
+  #notify(): void {
     if (this.#shower) showers.get(this.#shower)?.cutsChanged();
   }
 

@@ -2,7 +2,7 @@
 import type { Camera, SplatFilter } from '@gaussian-splat/core';
 import { Viewpoint, type FrameSettings, type World } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs, readBackWith, untilItHasRoom } from '@gaussian-splat/renderer/tools';
-import type { ReadCounts } from './painter.js';
+import type { ReadCounts } from './backend.js';
 
 /** Source of the counts: a backend. */
 export interface Counted {

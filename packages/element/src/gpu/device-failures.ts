@@ -1,6 +1,6 @@
 /** Handling of lost devices in a scene's life cycle. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { Painter } from './painter.js';
+import type { Backend } from './backend.js';
 
 /** The device was lost before the first frame. */
 export class DeviceLostError extends Error {
@@ -25,17 +25,17 @@ export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
 const LOSS_MS = 200;
 
 /** Whether a failure resulted from the end of drawing, or from a lost device. */
-export async function isGone(painter: Pick<Painter, 'isDestroyed' | 'isLost'>): Promise<boolean> {
-  if (!painter.isDestroyed && !painter.isLost) await delay(LOSS_MS);
-  return painter.isDestroyed || painter.isLost;
+export async function isGone(backend: Pick<Backend, 'isDestroyed' | 'isLost'>): Promise<boolean> {
+  if (!backend.isDestroyed && !backend.isLost) await delay(LOSS_MS);
+  return backend.isDestroyed || backend.isLost;
 }
 
 /** Whether the device was lost before all submitted work was done. */
-export async function wasLost(painter: Pick<Painter, 'finished' | 'isLost'>): Promise<boolean> {
-  await painter.finished();
+export async function wasLost(backend: Pick<Backend, 'finished' | 'isLost'>): Promise<boolean> {
+  await backend.finished();
   // The loss is reported a little later.
   await new Promise((resolve) => setTimeout(resolve));
-  return painter.isLost;
+  return backend.isLost;
 }
 
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));

@@ -1,10 +1,10 @@
 import type { GaussianScene } from '@gaussian-splat/renderer';
 import { QueueClock } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
-import type { Timeline } from '../live/live-model.js';
-import type { Contents, LodSettings, Painter, PainterEvents, Drawable, Place } from './painter.js';
+import type { Timeline } from '../dynamic/dynamic-model.js';
+import type { FrameSource, LodSettings, Backend, BackendEvents, Drawable, DeviceOwner } from './backend.js';
 import type { DeviceLease } from './shared-device.js';
-import { Viewport } from './viewport.js';
+import { WebGpuBackend } from './webgpu-backend.js';
 
 /** A scene's Gaussians with additional levels of detail, which own only the levels. */
 export interface OwnedLevels extends GaussianScene {
@@ -141,8 +141,8 @@ export class LoadedGaussians implements Drawable {
   }
 
   /** Creates its backend. */
-  openPainter(contents: Contents, events: PainterEvents): Painter {
-    return new Viewport(this, contents, events);
+  openBackend(contents: FrameSource, events: BackendEvents): Backend {
+    return new WebGpuBackend(this, contents, events);
   }
 
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
@@ -150,7 +150,7 @@ export class LoadedGaussians implements Drawable {
     return this.#lease.device;
   }
 
-  get place(): Place {
+  get place(): DeviceOwner {
     return this.#lease;
   }
 

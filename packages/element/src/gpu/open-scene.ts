@@ -1,7 +1,7 @@
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { startVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
-import type { LiveRequest } from '../live/live-model.js';
+import type { DynamicRequest } from '../dynamic/dynamic-model.js';
 import type { FileRequest, LoadedSequence, PartListener, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
@@ -12,7 +12,7 @@ import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu, why } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 import { shown, upload } from './upload.js';
-import { canvasFormat } from './viewport.js';
+import { canvasFormat } from './webgpu-backend.js';
 
 export interface OpenOptions {
   readonly device: SharedDevice;
@@ -35,7 +35,7 @@ export interface OpenOptions {
   /** Opens sources other than scenes of splats. */
   readonly open: typeof openGaussians | undefined;
   /** Additional data of a request for a generator. */
-  readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
+  readonly live: () => Omit<DynamicRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
 /**
@@ -70,7 +70,7 @@ export const limited = <T extends FileRequest>(request: T, { memoryBudget }: Pic
 export async function openGaussians(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   // Checked first, so that no bytes are fetched in vain.
   await assertWebGpu();
-  const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
+  const open = isGenerator(request) ? openDynamicScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
   const scene = await open(limited(request, options), options);
   chooseAtRest(scene.device);
   return scene;
@@ -144,7 +144,7 @@ async function openSequence(
 ): Promise<LoadedGaussians> {
   const { SequencePlayer } = await loadModule(
     'the code that plays sequences',
-    () => import('../live/sequence-player.js'),
+    () => import('../dynamic/sequence-player.js'),
   );
   const { listeners, loops } = options.live();
   const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners, loops });
@@ -155,11 +155,11 @@ async function openSequence(
 }
 
 /** Requests device and code concurrently. */
-async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
+async function openDynamicScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   const acquiring = options.device.acquire();
   try {
-    const live = await loadModule('the code that runs generators', () => import('../live/open-live-model.js'));
-    return await live.openLiveScene(request, options, await acquiring);
+    const live = await loadModule('the code that runs generators', () => import('../dynamic/open-dynamic-model.js'));
+    return await live.openDynamicScene(request, options, await acquiring);
   } catch (error) {
     acquiring.then((lease) => lease.release(), ignore);
     throw error;

@@ -4,12 +4,12 @@ import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
-import type { Here, SceneLoader } from '../loading/scene-loader.js';
-import type { ClipPlayer } from '../live/clip-player.js';
-import type { LiveRequest } from '../live/live-model.js';
+import type { SceneWorker, SceneLoader } from '../loading/scene-loader.js';
+import type { ClipPlayer } from '../dynamic/clip-player.js';
+import type { DynamicRequest } from '../dynamic/dynamic-model.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { OwnedGaussians } from './loaded-gaussians.js';
-import type { LodSettings } from './painter.js';
+import type { LodSettings } from './backend.js';
 import { streamCaps } from './stream-caps.js';
 
 export interface StreamedOptions {
@@ -21,7 +21,7 @@ export interface StreamedOptions {
   /** Called when another frame is needed. */
   readonly onChange: () => void;
   /** Additional data for a clip. */
-  readonly live: () => Pick<LiveRequest, 'listeners' | 'loops' | 'state'>;
+  readonly live: () => Pick<DynamicRequest, 'listeners' | 'loops' | 'state'>;
 }
 
 /** A scene that is loaded in parts. */
@@ -80,7 +80,7 @@ export async function openStreamed(
 }
 
 async function openClip(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
-  const { ClipPlayer } = await loadModule('the code that plays clips', () => import('../live/clip-player.js'));
+  const { ClipPlayer } = await loadModule('the code that plays clips', () => import('../dynamic/clip-player.js'));
   const { listeners, loops, state } = options.live();
   const startSeconds = state().timeSeconds;
   const player = await ClipPlayer.open({ ...options, request, device, listeners, loops, startSeconds });
@@ -153,7 +153,7 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
     const part = `${page.box} ${page.level}`;
     const place = { url, path: files[file], first, count };
     const box = { ...place, page, scene: levels.scene, credentials, limits: allowance.of(part) };
-    const here = ({ readBox }: Here): Promise<ArrayBuffer> => readBox(box, aborted);
+    const here = ({ readBox }: SceneWorker): Promise<ArrayBuffer> => readBox(box, aborted);
     return new Uint32Array(await allowance.note(part, loader.ask({ type: 'box', request: box }, aborted, here)));
   });
   return StreamedGaussians.openSource(device, source, pool);

@@ -1,13 +1,13 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
-import type { Place } from './painter.js';
+import type { DeviceOwner } from './backend.js';
 import { requestGpuDevice, why } from './request-device.js';
 
 /** Time limit of a request for a device, ms. */
 const ANSWER_MS = 20_000;
 
 /** A lease of the page's GPU device. */
-export interface DeviceLease extends Place {
+export interface DeviceLease extends DeviceOwner {
   readonly device: GPUDevice;
   /** Releases the lease; the last one destroys the device. Further calls have no effect. */
   release(): void;
@@ -31,18 +31,18 @@ class DeviceSession {
       this.isLost = true;
       this.#info = info;
       if (this.isClosed) return;
-      for (const tell of this.#listeners) tell(info);
+      for (const notify of this.#listeners) notify(info);
       this.#listeners.clear();
     });
   }
 
   /** Creates a lease of the device; releasing the last one calls `onUnused`. */
   lease(onUnused: () => void): DeviceLease {
-    let tell: (info: GPUDeviceLostInfo) => void = () => undefined;
-    const lost = new Promise<GPUDeviceLostInfo>((resolve) => (tell = resolve));
-    if (this.#info) tell(this.#info);
+    let notify: (info: GPUDeviceLostInfo) => void = () => undefined;
+    const lost = new Promise<GPUDeviceLostInfo>((resolve) => (notify = resolve));
+    if (this.#info) notify(this.#info);
     this.#users++;
-    this.#listeners.add(tell);
+    this.#listeners.add(notify);
     let released = false;
     const isLost = (): boolean => this.isLost;
     return {
@@ -57,7 +57,7 @@ class DeviceSession {
       release: () => {
         if (released) return;
         released = true;
-        this.#listeners.delete(tell);
+        this.#listeners.delete(notify);
         if (--this.#users === 0) onUnused();
       },
     };

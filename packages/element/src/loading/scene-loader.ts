@@ -12,12 +12,12 @@ import type {
   WorkerRequest,
 } from './protocol.js';
 import type * as workerModule from './scene-worker.js';
-import { OWN_WORKERS } from './own-worker.js';
+import { WORKER_SOURCES } from './worker-sources.js';
 import { spawnAt } from './spawn-worker.js';
 import { WorkerPool } from './worker-pool.js';
 
 /** The worker's code. */
-export type Here = typeof workerModule;
+export type SceneWorker = typeof workerModule;
 
 /**
  * Loads scenes in workers: one for the whole page, started on the first load and ended when idle, and more only if that
@@ -42,13 +42,13 @@ export class SceneLoader {
       this.spawn,
       () => this.#code(),
       (reason) => void this.#warn(reason, locationOf()),
-      () => !spawn && locationOf() === null && ++this.#way < OWN_WORKERS.length,
+      () => !spawn && locationOf() === null && ++this.#way < WORKER_SOURCES.length,
     );
   }
 
   #spawnAt(location: string | null): Worker {
     document.addEventListener('securitypolicyviolation', this.#note);
-    return location === null ? OWN_WORKERS[this.#way]() : spawnAt(new URL(location, document.baseURI));
+    return location === null ? WORKER_SOURCES[this.#way]() : spawnAt(new URL(location, document.baseURI));
   }
 
   async #warn(reason: string, location: string | null): Promise<void> {
@@ -128,7 +128,7 @@ export class SceneLoader {
   ask<T>(
     request: WorkerRequest,
     signal: AbortSignal,
-    here: (code: Here) => Promise<T>,
+    here: (code: SceneWorker) => Promise<T>,
     options?: Parameters<WorkerPool['run']>[3],
   ): Promise<T> {
     const run = (asked: WorkerRequest): Promise<T> =>
@@ -137,7 +137,7 @@ export class SceneLoader {
     return isHidden ? withFile(request).then(run) : run(request);
   }
 
-  async #code(): Promise<Here> {
+  async #code(): Promise<SceneWorker> {
     try {
       return await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
     } catch (error) {

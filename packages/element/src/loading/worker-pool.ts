@@ -234,7 +234,7 @@ export class WorkerPool {
     for (const slot of this.#slots) {
       if (!slot.isAsked) continue;
       isIdle = false;
-      if (slot.missed >= SILENT) this.#relieve(slot);
+      if (slot.missed >= SILENT) this.#reassignJobs(slot);
       if (slot.missed++ === 0) slot.post({ type: 'ping' });
     }
     if (!isIdle) return;
@@ -246,13 +246,13 @@ export class WorkerPool {
    * Requests in an unresponsive worker restart in others. Without a load of its own it reads a canceled one, or is
    * dead.
    */
-  #relieve(slot: WorkerSlot): void {
+  #reassignJobs(slot: WorkerSlot): void {
     const isDead = slot.missed >= DEAD;
     const reader = isDead ? undefined : slot.reader;
     const jobs = [...slot.jobs.values()].filter((job) => job !== reader);
-    const guilty = slot.reader;
+    const stuckWorker = slot.reader;
     if (!reader) this.#end(slot);
-    for (const job of jobs) this.#move(slot, job, job === guilty ? AFTER_DEATH : 1);
+    for (const job of jobs) this.#move(slot, job, job === stuckWorker ? AFTER_DEATH : 1);
     this.#placeQueued();
   }
 
@@ -271,10 +271,10 @@ export class WorkerPool {
    */
   #crash(slot: WorkerSlot, message: string): void {
     const jobs = [...slot.jobs.values()];
-    const guilty = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);
+    const stuckWorker = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);
     this.#end(slot);
     for (const job of jobs)
-      this.#move(slot, job, job === guilty ? MOST_MOVES + 1 : 1, message || 'a worker that stopped');
+      this.#move(slot, job, job === stuckWorker ? MOST_MOVES + 1 : 1, message || 'a worker that stopped');
     this.#placeQueued();
   }
 

@@ -18,7 +18,7 @@ import {
 } from './three.js';
 import type { ViewerFrame } from '../camera/orbit.js';
 import type { MeshModel } from '../gpu/loaded-gaussians.js';
-import type { Frame } from '../live/frame-filter.js';
+import type { Frame } from '../dynamic/frame-filter.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
 import type { PlacedModel } from './meshes.js';
 import type { Model } from './model.js';

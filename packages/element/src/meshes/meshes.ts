@@ -5,9 +5,9 @@ import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import { credentialsOf } from '../attributes.js';
 import type { LoadedGaussians, MeshModel } from '../gpu/loaded-gaussians.js';
 import { limited } from '../gpu/open-scene.js';
-import type { Frame } from '../live/frame-filter.js';
+import type { Frame } from '../dynamic/frame-filter.js';
 import type { SourceEntry } from '../source-entry.js';
-import type { Member } from '../member.js';
+import type { WorldEntry } from '../world-entry.js';
 import type { ViewerFrame } from '../camera/orbit.js';
 import { MeshLayer, type MeshHit } from './mesh-layer.js';
 import type { Model } from './model.js';
@@ -22,7 +22,7 @@ export interface PlacedModel {
 /** From a glTF's axes, y up, to those of the cloud that its splats are read as. */
 const GLTF_TO_CLOUD: Matrix4 = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 /** Interface of the element for meshes. */
-interface MeshStage {
+interface MeshCore {
   readonly frame: ViewerFrame;
   warn(sentence: string): void;
 }
@@ -31,15 +31,15 @@ const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /** Meshes among the splats of an element. */
 export class Meshes {
-  readonly #sources: { readonly members: readonly Member[] };
-  readonly #stage: MeshStage;
+  readonly #sources: { readonly members: readonly WorldEntry[] };
+  readonly #core: MeshCore;
   /** The layer that draws them, if there are any. */
   #layer: MeshLayer | undefined;
   #preparing = Promise.resolve();
 
-  constructor(sources: { readonly members: readonly Member[] }, stage: MeshStage) {
+  constructor(sources: { readonly members: readonly WorldEntry[] }, core: MeshCore) {
     this.#sources = sources;
-    this.#stage = stage;
+    this.#core = core;
   }
 
   /** Drawn meshes with their transforms. */
@@ -83,7 +83,7 @@ export class Meshes {
     const { signal } = scene;
     const request = { url, credentials: credentialsOf(attributes.crossorigin), limits: services.sceneLimits };
     const mesh = await fetchMesh(services.sceneLoader, limited(request, { memoryBudget }), signal);
-    for (const warning of mesh.warnings) this.#stage.warn(`<gaussian-splat>: ${warning}`);
+    for (const warning of mesh.warnings) this.#core.warn(`<gaussian-splat>: ${warning}`);
     const model = await openModel(mesh, url, { device: scene.device, signal, memoryBudget });
     await this.prepare({ device: scene.device, model });
     if (signal.aborted) model.dispose();
@@ -94,7 +94,7 @@ export class Meshes {
   /** Draws them into a frame. @returns The target for splats over them. */
   draw(frame: Frame): Partial<FrameTarget> {
     const models = this.#models;
-    return this.#layer && models.length > 0 ? this.#layer.draw(frame, models, this.#stage.frame) : {};
+    return this.#layer && models.length > 0 ? this.#layer.draw(frame, models, this.#core.frame) : {};
   }
 
   /** Corrects the probe results of splats behind meshes. */
@@ -106,7 +106,7 @@ export class Meshes {
    * The source of the first triangle on a ray, and the names of the mesh and its material; null for none. Origin and
    * direction in viewer space.
    */
-  hit(origin: Vector3, direction: Vector3): (Omit<MeshHit, 'model'> & { readonly member: Member }) | null {
+  hit(origin: Vector3, direction: Vector3): (Omit<MeshHit, 'model'> & { readonly member: WorldEntry }) | null {
     const met = this.#layer?.hit(origin, direction);
     const member = met && this.#sources.members.find(({ scene }) => scene.model === met.model);
     return member ? { member, mesh: met.mesh, material: met.material } : null;

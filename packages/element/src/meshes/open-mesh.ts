@@ -4,7 +4,7 @@ import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { limitScenes } from '../gpu/memory-budget.js';
 import { limited, type OpenOptions } from '../gpu/open-scene.js';
 import { assertWebGpu } from '../gpu/request-device.js';
-import type { Timeline } from '../live/live-model.js';
+import type { Timeline } from '../dynamic/dynamic-model.js';
 import type { FileRequest, LoadedMesh, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { Model } from './model.js';
@@ -52,7 +52,7 @@ export async function openModel(
 /** Opens a mesh as a source that has no splats, so that its life is that of all sources. */
 export async function openMesh(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   await assertWebGpu();
-  const { device, signal, onProgress, live: liveRequest, submissions, beforeUpload, loader } = options;
+  const { device, signal, onProgress, live: dynamicRequest, submissions, beforeUpload, loader } = options;
   const acquiring = device.acquire();
   acquiring.catch(() => undefined);
   try {
@@ -60,7 +60,7 @@ export async function openMesh(request: SceneRequest, options: OpenOptions): Pro
     const lease = await acquiring;
     beforeUpload(mesh.byteLength);
     const model = await openModel(mesh, request.url, { ...options, device: lease.device });
-    const { onShown } = liveRequest().listeners;
+    const { onShown } = dynamicRequest().listeners;
     const live: Timeline | undefined = Number.isNaN(model.duration) ? undefined : timelineOf(model, onShown);
     const bounds = { ...model.bounds, up: [0, 1, 0] as const };
     const { warnings } = mesh;

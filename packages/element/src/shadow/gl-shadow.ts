@@ -1,15 +1,15 @@
 /** The shadow of a scene that WebGL draws: beneath it, in the same context. */
 import { multiply, type Camera } from '@gaussian-splat/core';
 import { DATA_WIDTH, GlGaussians, GlRenderer } from '@gaussian-splat/renderer/webgl';
-import type { GlPainter } from '../webgl/gl-painter.js';
+import type { WebGlBackend } from '../webgl/webgl-backend.js';
 import type { Taker } from './shadow-controller.js';
 import { alphaOfScene } from './take-alpha-gl.js';
 
 const upTo = (count: number): Uint32Array => Uint32Array.from({ length: count }, (_, i) => i);
 
 /** Takes images of a painter's scene, and draws shadows beneath it. */
-export function glTaker(painter: GlPainter): Taker {
-  const { lease, textures } = painter.scene;
+export function glTaker(backend: WebGlBackend): Taker {
+  const { lease, textures } = backend.scene;
   const { gl } = lease;
   const own = new GlRenderer(gl, textures);
   const { take, free } = alphaOfScene(gl, own, upTo(textures.facts.count));
@@ -25,9 +25,9 @@ export function glTaker(painter: GlPainter): Taker {
       renderer.render({ camera: placed, shDegree: 0, accumulation: 'rgba16float', resolutionScale: 1 });
       renderer.present(undefined, { keeps: true });
     };
-    painter.beneath = beneath;
+    backend.beneath = beneath;
     const remove = (): void => {
-      if (painter.beneath === beneath) painter.beneath = undefined;
+      if (backend.beneath === beneath) backend.beneath = undefined;
       renderer.destroy();
       gaussians.destroy();
     };

@@ -8,11 +8,11 @@ import { toViewer, type ViewerFrame } from '../camera/orbit.js';
 import type { SceneBounds } from '../camera/settings.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';
 import type { Mover } from '../controllers/motion.js';
-import type { Painter, Place } from '../gpu/painter.js';
-import type { Viewport } from '../gpu/viewport.js';
-import type { Frame } from '../live/frame-filter.js';
+import type { Backend, DeviceOwner } from '../gpu/backend.js';
+import type { WebGpuBackend } from '../gpu/webgpu-backend.js';
+import type { Frame } from '../dynamic/frame-filter.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
-import type { Member } from '../member.js';
+import type { WorldEntry } from '../world-entry.js';
 import { shadowSplats, takeShadow, type ShadowMap, type TakeAlpha } from './shadow-map.js';
 import { packSplats } from './splat-file.js';
 
@@ -25,10 +25,10 @@ export interface ShadowHost {
   readonly camera: { view(width: number, height: number): Camera };
   readonly behaviours: { add(mover: Mover): void };
   readonly isImmersed: boolean;
-  readonly view: { readonly painter: Painter | null };
+  readonly view: { readonly backend: Backend | null };
   readonly sources: {
     readonly world: World;
-    readonly members: readonly Member[];
+    readonly members: readonly WorldEntry[];
     readonly isPreview: boolean;
     readonly bounds: SceneBounds | null;
     readonly meshes: { readonly value: { readonly version: string } | undefined };
@@ -59,7 +59,7 @@ export function readShadow({ attributes, warn }: Pick<ShadowHost, 'attributes' |
 
 /** A shadow in the world of an element. */
 interface Shown {
-  readonly context: Place['context'];
+  readonly context: DeviceOwner['context'];
   readonly map: ShadowMap;
   /** From its own square to the world. */
   readonly toWorld: Matrix4;
@@ -70,7 +70,7 @@ interface Shown {
 
 /** Captures images of the scene when it has changed, makes flat splats of them, and puts these under the scene. */
 export class ShadowController implements ReactiveController, Mover {
-  readonly #stage: ShadowHost;
+  readonly #core: ShadowHost;
   /** The content that the current shadow was made for. */
   #key = '';
   #shown: Shown | undefined;
@@ -78,14 +78,14 @@ export class ShadowController implements ReactiveController, Mover {
   #notBefore = -Infinity;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(stage: ShadowHost) {
-    this.#stage = stage;
-    stage.element.addController(this);
-    stage.behaviours.add(this);
+  constructor(core: ShadowHost) {
+    this.#core = core;
+    core.element.addController(this);
+    core.behaviours.add(this);
   }
 
   hostUpdated(): void {
-    this.#stage.requestFrame();
+    this.#core.requestFrame();
   }
 
   hostDisconnected(): void {
@@ -93,21 +93,21 @@ export class ShadowController implements ReactiveController, Mover {
   }
 
   advance(now: number): boolean {
-    const { view, isImmersed } = this.#stage;
-    const { painter } = view;
-    if (this.#shown && this.#shown.context !== painter?.place.context) this.#remove();
-    if (!painter || painter.isLost || isImmersed) return false;
+    const { view, isImmersed } = this.#core;
+    const { backend } = view;
+    if (this.#shown && this.#shown.context !== backend?.place.context) this.#remove();
+    if (!backend || backend.isLost || isImmersed) return false;
     const key = this.#contentKey();
     if (key === '') this.#remove();
-    else if (key !== this.#key && !this.#isBusy) this.#renew(painter, key, now);
+    else if (key !== this.#key && !this.#isBusy) this.#renew(backend, key, now);
     this.#fade();
     return false;
   }
 
   /** Changes whenever the shadow would; empty without a shadow. */
   #contentKey(): string {
-    const { sources } = this.#stage;
-    const { intensity, softness } = readShadow(this.#stage);
+    const { sources } = this.#core;
+    const { intensity, softness } = readShadow(this.#core);
     if (intensity === 0 || sources.members.length === 0 || sources.isPreview) return '';
     const places = sources.members.map(({ placement: { scene, sceneToWorld, visible, crop, opacity } }) => {
       const place = sceneToWorld ? Array.from(sceneToWorld).join() : '';
@@ -116,40 +116,40 @@ export class ShadowController implements ReactiveController, Mover {
     return [...places, sources.meshes.value?.version, intensity, softness].join('|');
   }
 
-  #renew(painter: Painter, key: string, now: number): void {
+  #renew(backend: Backend, key: string, now: number): void {
     if (now < this.#notBefore) {
       // The shadow of a finished motion shows the last pose.
       this.#timer ??= setTimeout(() => {
         this.#timer = undefined;
-        this.#stage.requestFrame();
+        this.#core.requestFrame();
       }, this.#notBefore - now);
       return;
     }
     this.#isBusy = true;
     this.#key = key;
     const begin = performance.now();
-    this.#make(painter)
+    this.#make(backend)
       .catch((error: Error) => {
-        if (!painter.isLost && !painter.isDestroyed) this.#stage.warn(`<gaussian-splat> shadow: ${error.message}`);
+        if (!backend.isLost && !backend.isDestroyed) this.#core.warn(`<gaussian-splat> shadow: ${error.message}`);
       })
       .finally(() => {
         this.#isBusy = false;
         this.#notBefore = performance.now() + Math.max(LEAST_MS, SHARE * (performance.now() - begin));
-        this.#stage.requestFrame();
+        this.#core.requestFrame();
       });
   }
 
-  async #make(painter: Painter): Promise<void> {
-    const { sources, frame, services } = this.#stage;
+  async #make(backend: Backend): Promise<void> {
+    const { sources, frame, services } = this.#core;
     const { bounds } = sources;
     const [scene] = sources.members.map((member) => member.scene);
     if (!bounds || !scene) return;
     const { center, radius } = bounds.subject ?? bounds;
-    const { intensity, softness } = readShadow(this.#stage);
-    const taker = await this.#taker(painter);
+    const { intensity, softness } = readShadow(this.#core);
+    const taker = await this.#taker(backend);
     try {
       const map = await takeShadow({ center: toViewer(frame, center), radius, frame }, taker.take);
-      if (map === null || painter.isLost || painter.isDestroyed) return this.#remove();
+      if (map === null || backend.isLost || backend.isDestroyed) return this.#remove();
       const rows = shadowSplats(map, intensity, softness);
       if (rows.length === 0) return this.#remove();
       const packed = await packSplats(rows, services.sceneLoader, scene.signal);
@@ -162,17 +162,17 @@ export class ShadowController implements ReactiveController, Mover {
   }
 
   /** Captures images and shows shadows with the painter's own API. */
-  async #taker(painter: Painter): Promise<Taker> {
-    if (painter.place.context instanceof WebGL2RenderingContext) {
+  async #taker(backend: Backend): Promise<Taker> {
+    if (backend.place.context instanceof WebGL2RenderingContext) {
       const { glTaker } = await import('./gl-shadow.js');
-      return glTaker(painter as Parameters<typeof glTaker>[0]);
+      return glTaker(backend as Parameters<typeof glTaker>[0]);
     }
     const { alphaOfWorld } = await import('./take-alpha.js');
-    const { sources } = this.#stage;
-    const { device, view } = painter as Viewport;
+    const { sources } = this.#core;
+    const { device, view } = backend as WebGpuBackend;
     const { take, free } = alphaOfWorld({
       ...{ device, members: sources.members, settings: view.settings, filter: view.filter },
-      drawBeneath: (camera) => this.#stage.drawBeneath({ camera } as Frame),
+      drawBeneath: (camera) => this.#core.drawBeneath({ camera } as Frame),
     });
     const show: Taker['show'] = async (packed, map, toWorld) => {
       const gaussians = await GaussianBuffers.upload(device, packed);
@@ -190,7 +190,7 @@ export class ShadowController implements ReactiveController, Mover {
   #fade(): void {
     if (!this.#shown) return;
     const { map } = this.#shown;
-    const { frame, camera } = this.#stage;
+    const { frame, camera } = this.#core;
     const [, height] = toViewer(frame, eyeOf(camera.view(1, 1).worldToCamera));
     this.#shown.fade(Math.min(1, Math.max(0, (height - map.middle[1]) / (FADE * map.half))));
   }

@@ -8,12 +8,12 @@ import {
   type FrameTarget,
   type GaussianScene,
 } from '@gaussian-splat/renderer';
-import type { Member } from '../member.js';
+import type { WorldEntry } from '../world-entry.js';
 import { SHADOW_PIXELS, type TakeAlpha } from './shadow-map.js';
 
 export interface AlphaSource {
   readonly device: GPUDevice;
-  readonly members: readonly Member[];
+  readonly members: readonly WorldEntry[];
   readonly settings: FrameSettings;
   readonly filter: SplatFilter | undefined;
   /** Draws the meshes beneath the splats. */

@@ -151,7 +151,7 @@ export class WalkController implements ReactiveController, Mover {
     const { theta } = camera.goal;
     const [sin, cos] = [Math.sin(theta), Math.cos(theta)];
     this.#walker!.step(seconds, right * cos - forward * sin, -right * sin - forward * cos, this.#isFast);
-    this.#tellBlocked(right !== 0 || forward !== 0);
+    this.#notifyBlocked(right !== 0 || forward !== 0);
     this.#follow();
   }
 
@@ -165,7 +165,7 @@ export class WalkController implements ReactiveController, Mover {
   }
 
   /** A wall is announced to screen readers once. */
-  #tellBlocked(isWalking: boolean): void {
+  #notifyBlocked(isWalking: boolean): void {
     const isBlocked = isWalking && this.#walker!.isBlocked;
     if (isBlocked && !this.#isSaid) this.#of.behaviours.announcer.value?.say(this.#word('blocked'));
     if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviours.announcer.value?.say('');

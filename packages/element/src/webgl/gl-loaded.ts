@@ -1,9 +1,9 @@
 import { areasIn, glBytes, GlGaussians, GlRenderer, positionsIn } from '@gaussian-splat/renderer/webgl';
 import { LoadedGaussians, type OwnedGaussians } from '../gpu/loaded-gaussians.js';
 import { limit } from '../gpu/memory-budget.js';
-import type { Contents, Painter, PainterEvents } from '../gpu/painter.js';
+import type { FrameSource, Backend, BackendEvents } from '../gpu/backend.js';
 import type { LoadedScene } from '../loading/protocol.js';
-import { GlPainter } from './gl-painter.js';
+import { WebGlBackend } from './webgl-backend.js';
 import type { GlLease } from './gl-session.js';
 
 export interface GlUploadOptions {
@@ -68,8 +68,8 @@ export class GlLoaded extends LoadedGaussians {
     }
   }
 
-  override openPainter(_: Contents, events: PainterEvents): Painter {
-    return new GlPainter(this, events);
+  override openBackend(_: FrameSource, events: BackendEvents): Backend {
+    return new WebGlBackend(this, events);
   }
 
   /** None are built. */

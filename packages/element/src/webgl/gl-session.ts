@@ -5,7 +5,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
 import { GlClock } from '@gaussian-splat/renderer/webgl';
-import type { Place } from '../gpu/painter.js';
+import type { DeviceOwner } from '../gpu/backend.js';
 import type { DeviceLease } from '../gpu/shared-device.js';
 
 /** A lease of the page's context. Its `device` throws a descriptive error, because there is no WebGPU device. */
@@ -21,7 +21,7 @@ const LOSS = { reason: 'unknown', message: 'the WebGL context was lost' } as GPU
 class GlSession {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
-  readonly limits: Place['limits'];
+  readonly limits: DeviceOwner['limits'];
   readonly memory: MemoryLedger;
   isLost = false;
   /** Listeners of a loss. A shared promise would retain every listener that ever waited for it. */
@@ -38,7 +38,7 @@ class GlSession {
     gl.canvas.addEventListener('webglcontextlost', () => {
       this.isLost = true;
       if (current === this) current = undefined;
-      for (const tell of this.#listeners) tell();
+      for (const notify of this.#listeners) notify();
       this.#listeners.clear();
     });
   }
@@ -51,9 +51,9 @@ class GlSession {
 
   lease(): GlLease {
     this.#users++;
-    let tell: () => void = () => undefined;
-    const lost = new Promise<GPUDeviceLostInfo>((resolve) => (tell = () => resolve(LOSS)));
-    this.#listeners.add(tell);
+    let notify: () => void = () => undefined;
+    const lost = new Promise<GPUDeviceLostInfo>((resolve) => (notify = () => resolve(LOSS)));
+    this.#listeners.add(notify);
     let isReleased = false;
     const isLost = (): boolean => this.isLost;
     return {
@@ -73,7 +73,7 @@ class GlSession {
       release: () => {
         if (isReleased) return;
         isReleased = true;
-        this.#listeners.delete(tell);
+        this.#listeners.delete(notify);
         if (--this.#users === 0) this.#end();
       },
     };

@@ -34,14 +34,14 @@ export const AR_STYLES = css`
 /** Overlay of an AR session on a phone: an exit button, and the author's prompt until the object is placed. */
 export class ArOverlay {
   readonly root: HTMLElement;
-  readonly #stage: XrHost;
+  readonly #core: XrHost;
   readonly #prompt: HTMLSlotElement;
   readonly #exit: HTMLButtonElement;
   onExit: () => void = () => undefined;
 
-  constructor(element: HTMLElement, stage: XrHost) {
+  constructor(element: HTMLElement, core: XrHost) {
     const { ownerDocument: page } = element;
-    this.#stage = stage;
+    this.#core = core;
     this.root = page.createElement('div');
     this.root.className = 'ar-overlay';
     this.#prompt = Object.assign(page.createElement('slot'), { name: 'ar-prompt' });
@@ -59,7 +59,7 @@ export class ArOverlay {
   }
 
   show(): void {
-    const { strings } = this.#stage;
+    const { strings } = this.#core;
     this.#exit.textContent = strings['exit-ar'] ?? WORDS['exit-ar'];
     this.#exit.lang = languageOf(strings) ?? '';
     this.#prompt.hidden = false;

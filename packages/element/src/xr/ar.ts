@@ -37,9 +37,9 @@ interface Footprint {
 }
 
 /** Footprint of the subject: splats within the sphere that framing has found, without the lowest hundredth. */
-export function footprintOf(stage: XrHost, positions: Float32Array, origin: Vector3): Footprint {
-  const { center, radius } = stage.camera.bounds;
-  const { frame } = stage;
+export function footprintOf(core: XrHost, positions: Float32Array, origin: Vector3): Footprint {
+  const { center, radius } = core.camera.bounds;
+  const { frame } = core;
   const kept = positions.slice();
   const heights: number[] = [];
   for (let at = 0; at < positions.length; at += 3) {
@@ -56,31 +56,31 @@ export function footprintOf(stage: XrHost, positions: Float32Array, origin: Vect
 }
 
 /** Offers AR: WebXR if available, else the author's model on iPhones. */
-export function offerAr(element: ReactiveControllerHost & HTMLElement, stage: XrHost, place: HTMLElement): XrOffer {
+export function offerAr(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement): XrOffer {
   adoptStyles(element.shadowRoot!, AR_STYLES);
-  const overlay = new ArOverlay(element, stage);
-  const offer = new XrOffer(element, stage, place, arKind(stage, overlay));
+  const overlay = new ArOverlay(element, core);
+  const offer = new XrOffer(element, core, place, arKind(core, overlay));
   overlay.onExit = () => offer.end();
-  element.addController(new SimplifiedModel(element, stage, place, offer));
+  element.addController(new SimplifiedModel(element, core, place, offer));
   return offer;
 }
 
-const arKind = (stage: XrHost, overlay: ArOverlay): XrKind => ({
+const arKind = (core: XrHost, overlay: ArOverlay): XrKind => ({
   ...{ mode: 'immersive-ar', name: 'ar', word: 'ar' },
-  isWanted: () => stage.attributes.ar && /(^|\s)webxr(\s|$)/.test(stage.attributes.arModes?.trim() || 'webxr'),
+  isWanted: () => core.attributes.ar && /(^|\s)webxr(\s|$)/.test(core.attributes.arModes?.trim() || 'webxr'),
   options: () => ({
     requiredFeatures: ['hit-test'],
     optionalFeatures: ['anchors', 'local-floor', 'dom-overlay'],
     domOverlay: { root: overlay.root },
   }),
   spaces: ['local-floor', 'local'],
-  guide: (started) => new ArGuide(stage, started, overlay),
+  guide: (started) => new ArGuide(core, started, overlay),
 });
 
 /** Places the subject at the hit point of the view ray with the room, and lets gestures move, turn and scale it. */
 class ArGuide implements XrGuide {
   readonly background = [0, 0, 0, 0] as const;
-  readonly #stage: XrHost;
+  readonly #core: XrHost;
   readonly #of: XrStarted;
   readonly #overlay: ArOverlay;
   #shadow: { readonly splats: MarkerSplats; readonly half: number } | undefined;
@@ -94,13 +94,13 @@ class ArGuide implements XrGuide {
   #isAnchored = false;
   #fingers: Fingers | undefined;
 
-  constructor(stage: XrHost, of: XrStarted, overlay: ArOverlay) {
-    this.#stage = stage;
+  constructor(core: XrHost, of: XrStarted, overlay: ArOverlay) {
+    this.#core = core;
     this.#of = of;
     this.#overlay = overlay;
-    const unit = unitOf(stage);
-    if (unit === undefined && stage.attributes.arScale === 'fixed')
-      stage.warn(
+    const unit = unitOf(core);
+    if (unit === undefined && core.attributes.arScale === 'fixed')
+      core.warn(
         '<gaussian-splat> ar-scale="fixed": expected the attribute unit, such as unit="1m"; the object is 0.5 to 1 m large.',
       );
     this.#unit = unit ?? 1;
@@ -117,10 +117,10 @@ class ArGuide implements XrGuide {
     const found = loop?.scene;
     if (!found) return null;
     if (!this.#footprint) {
-      this.#footprint = footprintOf(this.#stage, found.positions, found.origin);
+      this.#footprint = footprintOf(this.#core, found.positions, found.origin);
       loop.crop(this.#footprint.positions);
       this.#scale = this.#firstScale(this.#footprint);
-      this.#castShadow(found, this.#footprint).catch(({ message }: Error) => this.#stage.warn(message));
+      this.#castShadow(found, this.#footprint).catch(({ message }: Error) => this.#core.warn(message));
     }
     if (!this.#at) this.#look(frame, pose);
     if (!this.#at) return null;
@@ -142,7 +142,7 @@ class ArGuide implements XrGuide {
   /** The same shadow as in the page, for the subject alone. */
   async #castShadow({ renderer }: XrScene, { positions, radius }: Footprint): Promise<void> {
     const { gl, signal } = this.#of;
-    const { camera, frame, services, attributes } = this.#stage;
+    const { camera, frame, services, attributes } = this.#core;
     const kept = Uint32Array.from(positions.keys()).filter(
       (i) => 3 * i < positions.length && positions[3 * i] === positions[3 * i],
     );
@@ -150,18 +150,18 @@ class ArGuide implements XrGuide {
     const center = toViewer(frame, camera.bounds.center);
     const map = await takeShadow({ center, radius, frame }, take).finally(free);
     if (map === null || signal.aborted) return;
-    const { intensity, softness } = readShadow(this.#stage);
+    const { intensity, softness } = readShadow(this.#core);
     const rows = shadowSplats(map, attributes.shadowIntensity ? intensity : 1, softness);
     const splats = new MarkerSplats(gl, rows, services.sceneLoader, signal);
     this.#shadow = { splats, half: map.half };
   }
 
   get #isWall(): boolean {
-    return this.#stage.attributes.arPlacement === 'wall';
+    return this.#core.attributes.arPlacement === 'wall';
   }
 
   get #isFixed(): boolean {
-    const { attributes } = this.#stage;
+    const { attributes } = this.#core;
     return attributes.arScale === 'fixed' && Boolean(attributes.unit);
   }
 
@@ -228,7 +228,7 @@ class ArGuide implements XrGuide {
     this.#turn -= fingers.angle - before.angle;
     if (this.#isFixed || before.apart === 0) return;
     this.#scale = Math.min(MOST_SCALE, Math.max(LEAST_SCALE, (this.#scale * fingers.apart) / before.apart));
-    if (this.#stage.attributes.unit && Math.abs(this.#scale - 1) < SNAP) this.#scale = 1;
+    if (this.#core.attributes.unit && Math.abs(this.#scale - 1) < SNAP) this.#scale = 1;
   }
 
   #onPlane(frame: XrFrame, input: XrInput & { targetRayMode?: string }): { x: number; z: number } | undefined {
@@ -242,7 +242,7 @@ class ArGuide implements XrGuide {
   #matrix([x, y, z]: Vector3, { base, height, radius }: Footprint): Float64Array {
     const size = this.#scale;
     const [sin, cos] = [size * Math.sin(this.#turn), size * Math.cos(this.#turn)];
-    const meters = metersOf(this.#stage.frame, this.#unit);
+    const meters = metersOf(this.#core.frame, this.#unit);
     // The center of its base is placed there; on a wall, the center of its back.
     const [lift, back] = this.#isWall ? [height / 2, -radius] : [0, 0];
     const [px, py, pz] = [base[0], base[1] + lift, base[2] + back].map((value) => value * this.#unit);

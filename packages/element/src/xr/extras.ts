@@ -39,17 +39,17 @@ export class Extras {
   readonly measure: Lazy<unknown>;
   readonly shadow: Lazy<unknown>;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost & ShadowHost) {
+  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost & ShadowHost) {
     adoptStyles(element.shadowRoot!, STYLES);
     const place = element.ownerDocument.createElement('div');
     place.className = 'extras';
-    stage.surface?.after(place);
+    core.surface?.after(place);
     const update = (): void => element.requestUpdate();
     this.vr = new Lazy(
       'the code for VR',
       async () => {
         const [{ XrOffer }, { vrKind }] = await Promise.all([import('./xr-offer.js'), import('./vr.js')]);
-        return new XrOffer(element, stage, place, vrKind(stage));
+        return new XrOffer(element, core, place, vrKind(core));
       },
       update,
     );
@@ -57,23 +57,23 @@ export class Extras {
       'the code for AR',
       async () => {
         const { offerAr } = await import('./ar.js');
-        return offerAr(element, stage, place);
+        return offerAr(element, core, place);
       },
       update,
     );
     this.measure = new Lazy(
       'the code for measuring',
       async () => {
-        const [{ Measure }] = await Promise.all([import('./measure.js'), stage.behaviours.announcer.get()]);
-        return new Measure(element, stage, place);
+        const [{ Measure }] = await Promise.all([import('./measure.js'), core.behaviours.announcer.get()]);
+        return new Measure(element, core, place);
       },
       update,
     );
     this.shadow = new Lazy('the code for shadows', async () => {
       const { ShadowController } = await import('../shadow/shadow-controller.js');
-      return new ShadowController(stage);
+      return new ShadowController(core);
     });
-    const warn = ({ message }: Error): void => stage.warn(message);
+    const warn = ({ message }: Error): void => core.warn(message);
     const find = ({ attributes }: XrHost): void => {
       if (attributes.shadowIntensity) this.shadow.want(warn);
       if (attributes.vr) this.vr.want(warn);
@@ -97,6 +97,6 @@ export class Extras {
       canActivateVR: { get: () => this.vr.value?.canActivate ?? false },
       canActivateAR: { get: () => this.ar.value?.canActivate ?? false },
     });
-    element.addController({ hostUpdated: () => find(stage) });
+    element.addController({ hostUpdated: () => find(core) });
   }
 }

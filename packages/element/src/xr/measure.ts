@@ -55,7 +55,7 @@ const DIGITS = 3;
 /** A ruler: two ends on surfaces of the scene, a line, and its length with its uncertainty. */
 export class Measure implements ReactiveController {
   readonly #element: ReactiveControllerHost & HTMLElement;
-  readonly #stage: XrHost;
+  readonly #core: XrHost;
   readonly #place: HTMLElement;
   readonly #button: HTMLButtonElement;
   readonly #drawing: SVGSVGElement;
@@ -65,9 +65,9 @@ export class Measure implements ReactiveController {
   #pressed: readonly [number, number] | undefined;
   #hasKeyboard = false;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost, place: HTMLElement) {
+  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement) {
     this.#element = element;
-    this.#stage = stage;
+    this.#core = core;
     this.#place = place;
     adoptStyles(element.shadowRoot!, STYLES);
     const page = element.ownerDocument;
@@ -85,7 +85,7 @@ export class Measure implements ReactiveController {
   }
 
   hostUpdated(): void {
-    const { attributes, isOnShow, strings } = this.#stage;
+    const { attributes, isOnShow, strings } = this.#core;
     if (!attributes.measure || !isOnShow) return this.#stop();
     this.#button.textContent = this.#word('measure');
     this.#button.lang = languageOf(strings) ?? '';
@@ -98,11 +98,11 @@ export class Measure implements ReactiveController {
   }
 
   #word(key: ExtraWord): string {
-    return this.#stage.strings[key] ?? WORDS[key];
+    return this.#core.strings[key] ?? WORDS[key];
   }
 
   #say(text: string): void {
-    this.#stage.behaviours.announcer.value?.say(text);
+    this.#core.behaviours.announcer.value?.say(text);
   }
 
   #toggle(): void {
@@ -112,7 +112,7 @@ export class Measure implements ReactiveController {
   }
 
   #take(): void {
-    const { surface } = this.#stage;
+    const { surface } = this.#core;
     if (!surface) return;
     this.#listening = new AbortController();
     const { signal } = this.#listening;
@@ -176,13 +176,13 @@ export class Measure implements ReactiveController {
     if (event.key !== 'Enter') return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    const { left, top, width, height } = this.#stage.surface!.getBoundingClientRect();
+    const { left, top, width, height } = this.#core.surface!.getBoundingClientRect();
     void this.#setEnd(left + width / 2, top + height / 2);
   };
 
   async #setEnd(clientX: number, clientY: number): Promise<void> {
     const signal = this.#listening?.signal;
-    const point = await this.#stage.positionFromPoint(clientX, clientY);
+    const point = await this.#core.positionFromPoint(clientX, clientY);
     if (!signal || signal.aborted) return;
     if (point === null) return this.#say(this.#word('measure-none'));
     // A third point starts a new measurement.
@@ -199,13 +199,13 @@ export class Measure implements ReactiveController {
     if (!to) return undefined;
     const length = Math.hypot(to.x - from.x, to.y - from.y, to.z - from.z);
     const uncertainty = Math.hypot(from.uncertainty, to.uncertainty);
-    const unit = unitOf(this.#stage);
+    const unit = unitOf(this.#core);
     return { from, to, length, uncertainty, meters: unit === undefined ? null : length * unit, unit: unit ?? null };
   }
 
   /** Draws the ruler at its ends' positions in the last frame. */
   readonly #draw = (): void => {
-    const { drawnFrom: camera, surface, frame } = this.#stage;
+    const { drawnFrom: camera, surface, frame } = this.#core;
     this.#drawing.replaceChildren();
     this.#label.hidden = true;
     if (!camera || !surface) return;

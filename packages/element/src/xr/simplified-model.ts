@@ -9,14 +9,14 @@ const opensModels = (page: Document): boolean =>
 
 /** On iPhones there is no WebXR: the author's own mesh, by its name, if the page has one. */
 export class SimplifiedModel implements ReactiveController {
-  readonly #stage: XrHost;
+  readonly #core: XrHost;
   readonly #place: HTMLElement;
   readonly #offer: XrOffer;
   readonly #link: HTMLAnchorElement;
   readonly #element: HTMLElement;
 
-  constructor(element: HTMLElement, stage: XrHost, place: HTMLElement, offer: XrOffer) {
-    this.#stage = stage;
+  constructor(element: HTMLElement, core: XrHost, place: HTMLElement, offer: XrOffer) {
+    this.#core = core;
     this.#place = place;
     this.#offer = offer;
     this.#element = element;
@@ -27,7 +27,7 @@ export class SimplifiedModel implements ReactiveController {
   }
 
   hostUpdated(): void {
-    const { attributes, strings } = this.#stage;
+    const { attributes, strings } = this.#core;
     const modes = attributes.arModes?.trim() || 'webxr quick-look';
     const isOffered =
       attributes.ar &&

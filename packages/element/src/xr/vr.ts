@@ -16,8 +16,8 @@ const BACKGROUND = [0.1, 0.1, 0.11, 1] as const;
 const MIN_AREA = 4;
 
 /** The unit of the file, meters. */
-export const unitOf = (stage: XrHost): number | undefined =>
-  readAttribute('unit', stage.attributes.unit, optionalLengthGrammar, (sentence) => stage.warn(sentence));
+export const unitOf = (core: XrHost): number | undefined =>
+  readAttribute('unit', core.attributes.unit, optionalLengthGrammar, (sentence) => core.warn(sentence));
 
 /** Rows of the matrix from the scene's frame to viewer space in meters. */
 export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
@@ -35,32 +35,32 @@ export const metersOf = ([x, y, z]: ViewerFrame, unit: number): Float64Array =>
   ]);
 
 /** Sessions in a headset that does not show the room. */
-export const vrKind = (stage: XrHost): XrKind => ({
+export const vrKind = (core: XrHost): XrKind => ({
   ...{ mode: 'immersive-vr', name: 'vr', word: 'vr' },
-  isWanted: () => stage.attributes.vr,
+  isWanted: () => core.attributes.vr,
   options: () => ({ optionalFeatures: ['local-floor', 'hand-tracking'] }),
   spaces: ['local-floor', 'local'],
-  guide: (started) => guideOf(stage, started),
+  guide: (started) => guideOf(core, started),
 });
 
-function guideOf(stage: XrHost, { session, space, spaceType, signal, gl }: XrStarted): XrGuide {
-  const unit = unitOf(stage) ?? 1;
-  const { goal } = stage.camera;
+function guideOf(core: XrHost, { session, space, spaceType, signal, gl }: XrStarted): XrGuide {
+  const unit = unitOf(core) ?? 1;
+  const { goal } = core.camera;
   const rig = new VrRig(
     {
       eye: eyeOfPose(goal).map((value) => value * unit) as unknown as Vector3,
       heading: goal.theta,
-      toViewer: metersOf(stage.frame, unit),
+      toViewer: metersOf(core.frame, unit),
       isFloor: spaceType === 'local-floor',
       stepsOnly: prefersReducedMotion(),
     },
     () => void session.end().catch(() => undefined),
   );
-  findFloor(stage, unit, signal).then(
+  findFloor(core, unit, signal).then(
     (map) => map && !signal.aborted && (rig.map = map),
     () => undefined,
   );
-  const marker = new MarkerSplats(gl, ring(), stage.services.sceneLoader, signal);
+  const marker = new MarkerSplats(gl, ring(), core.services.sceneLoader, signal);
   return {
     background: BACKGROUND,
     place: (frame, pose, seconds) => rig.place(frame, pose, space, seconds),
@@ -71,8 +71,8 @@ function guideOf(stage: XrHost, { session, space, spaceType, signal, gl }: XrSta
   };
 }
 
-async function findFloor(stage: XrHost, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
-  const { attributes, camera, frame, services, walkable: request, element } = stage;
+async function findFloor(core: XrHost, unit: number, signal: AbortSignal): ReturnType<typeof openFloor> {
+  const { attributes, camera, frame, services, walkable: request, element } = core;
   const eye = eyeOfPose(camera.goal).map((value) => value * unit) as unknown as Vector3;
   const eyeHeight = readAttribute('eye-height', attributes.eyeHeight, lengthGrammar('1.6m'), () => undefined);
   const url = attributes.walkMap?.trim() || 'auto';

@@ -22,7 +22,7 @@ export interface XrHost {
   /** The request of the displayed scene; null without one, and for sources without a file. */
   readonly walkable: SceneRequest | null;
   readonly sources: {
-    readonly own: { readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean } };
+    readonly ownEntry: { readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean } };
   };
   readonly reveal: { dismiss(): void };
   readonly behaviours: { readonly announcer: Lazy<AnnouncerController> };

@@ -46,7 +46,7 @@ interface Running {
 
 /** Offers one kind of session: a button if sessions are supported, the session itself, and its status. */
 export class XrOffer implements ReactiveController {
-  readonly stage: XrHost;
+  readonly core: XrHost;
   readonly kind: XrKind;
   readonly #element: ReactiveControllerHost & HTMLElement;
   readonly #slot: HTMLSlotElement;
@@ -58,9 +58,9 @@ export class XrOffer implements ReactiveController {
   #watching: AbortController | undefined;
   #isWarned = false;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, stage: XrHost, place: HTMLElement, kind: XrKind) {
+  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost, place: HTMLElement, kind: XrKind) {
     this.#element = element;
-    this.stage = stage;
+    this.core = core;
     this.kind = kind;
     this.#place = place;
     const { ownerDocument: page } = element;
@@ -70,14 +70,14 @@ export class XrOffer implements ReactiveController {
     this.#slot.append(this.#button);
     // Also handles the author's button in the slot.
     this.#slot.addEventListener('click', () => {
-      this.activate().catch((error: Error) => stage.warn(error.message));
+      this.activate().catch((error: Error) => core.warn(error.message));
     });
     element.addController(this);
   }
 
   /** Whether a session could start now. */
   get canActivate(): boolean {
-    return this.#isSupported && this.kind.isWanted() && this.stage.walkable !== null;
+    return this.#isSupported && this.kind.isWanted() && this.core.walkable !== null;
   }
 
   get isPresenting(): boolean {
@@ -97,7 +97,7 @@ export class XrOffer implements ReactiveController {
     const { isConnected } = this.#element;
     if (isConnected && this.kind.isWanted()) this.#watch();
     else this.hostDisconnected();
-    const { strings } = this.stage;
+    const { strings } = this.core;
     this.#button.textContent = strings[this.kind.word] ?? WORDS[this.kind.word];
     if (Object.keys(strings).length === 0) this.#button.lang = 'en';
     else this.#button.removeAttribute('lang');
@@ -111,7 +111,7 @@ export class XrOffer implements ReactiveController {
    * draws, are gone.
    */
   #isOutdated({ context, shown }: Running): boolean {
-    const { scene } = this.stage.sources.own;
+    const { scene } = this.core.sources.ownEntry;
     return scene.isOutgoing || (context?.isOwn === false && scene.scene !== shown);
   }
 
@@ -159,12 +159,12 @@ export class XrOffer implements ReactiveController {
   }
 
   async #start(session: XrSession): Promise<void> {
-    const { stage } = this;
-    const running: Running = { session, over: new AbortController(), shown: stage.sources.own.scene.scene };
+    const { core } = this;
+    const running: Running = { session, over: new AbortController(), shown: core.sources.ownEntry.scene.scene };
     this.#running = running;
     session.addEventListener('end', () => this.#ended(running), { once: true });
-    stage.reveal.dismiss();
-    stage.isImmersed = true;
+    core.reveal.dismiss();
+    core.isImmersed = true;
     this.#element.requestUpdate();
     this.status('session-started');
     try {
@@ -178,10 +178,10 @@ export class XrOffer implements ReactiveController {
   }
 
   async #open(running: Running): Promise<void> {
-    const { stage, kind } = this;
+    const { core, kind } = this;
     const { session, over, shown } = running;
     const { signal } = over;
-    const request = stage.walkable;
+    const request = core.walkable;
     if (request === null) throw unsupported('a scene that has loaded', 'none');
     const context = (running.context = await contextFor(shown));
     if (signal.aborted) return this.#free(running);
@@ -190,11 +190,11 @@ export class XrOffer implements ReactiveController {
     if (signal.aborted) return;
     const guide = kind.guide({ ...{ session, space, spaceType, signal }, gl: context.gl, offer: this });
     running.loop = new XrLoop(session, context, space, guide);
-    const { sceneLoader: loader } = stage.services;
+    const { sceneLoader: loader } = core.services;
     const scene = await openXrScene(context, { shown, request, loader }, signal);
     running.scene = scene;
     if (signal.aborted) return this.#free(running);
-    const { maxShDegree: shDegree, filter, order } = stage.attributes;
+    const { maxShDegree: shDegree, filter, order } = core.attributes;
     running.loop.show(scene, {
       shDegree,
       filter: filter === 'auto' ? undefined : filter,
@@ -213,9 +213,9 @@ export class XrOffer implements ReactiveController {
     running.over.abort(new DOMException('the session is over', 'AbortError'));
     this.#free(running);
     this.#running = undefined;
-    this.stage.isImmersed = false;
+    this.core.isImmersed = false;
     if (this.#element.getAttribute(`${this.kind.name}-status`) !== 'failed') this.status('not-presenting');
-    this.stage.requestFrame();
+    this.core.requestFrame();
     this.#element.requestUpdate();
   }
 
@@ -252,7 +252,7 @@ export class XrOffer implements ReactiveController {
     this.#setSupported(false);
     if (this.#isWarned || name !== 'SecurityError') return;
     this.#isWarned = true;
-    this.stage.warn(
+    this.core.warn(
       `<gaussian-splat> ${this.kind.name}: this frame may not use WebXR. The page around it allows that by <iframe allow="xr-spatial-tracking; gamepad">.`,
     );
   }

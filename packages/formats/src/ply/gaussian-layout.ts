@@ -2,7 +2,7 @@ import { GaussianSplatError, loadModule, shCoefficientCount, type ShDegree } fro
 import { DEGREE_OF_REST_COUNT, type DraftCloud } from '../cloud.js';
 import type { SceneSource } from '../scene-format.js';
 import type { PlyElement, PlyHeader, PlyProperty } from './header.js';
-import type * as meaning from './meaning.js';
+import type * as meaning from './metadata.js';
 import type { ColumnTarget } from './rows.js';
 
 /** Layout of the splats in a PLY file, in the aspects that vary. */
@@ -111,7 +111,7 @@ const ODD = /^(face|tristrips|codebook_centers)$/;
 export const OFFSETS = /offset\.ply$/i;
 
 /** Loads the metadata reader for a header with more than plain splats; undefined for all others. */
-export async function loadMeaning(
+export async function loadMetadata(
   { comments, elements }: PlyHeader,
   fileName: string,
 ): Promise<typeof meaning | undefined> {
@@ -127,7 +127,7 @@ export async function loadMeaning(
 }
 
 export const importMeaning = (): Promise<typeof meaning> =>
-  loadModule('the code that reads what a PLY says of itself', () => import('./meaning.js'));
+  loadModule('the code that reads what a PLY says of itself', () => import('./metadata.js'));
 
 /** Element and property of SHARP's color space. */
 export const COLOR_SPACE = 'color_space';

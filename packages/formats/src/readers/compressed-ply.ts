@@ -1,7 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, type DraftCloud } from '../cloud.js';
-import { harmonicTargets, loadMeaning, shDegreeOf } from '../ply/gaussian-layout.js';
+import { harmonicTargets, loadMetadata, shDegreeOf } from '../ply/gaussian-layout.js';
 import { parsePlyHeader, type PlyElement, type PlyHeader } from '../ply/header.js';
 import { openElement, readColumns } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';
@@ -38,9 +38,9 @@ export async function readCompressedPly(source: SceneSource): Promise<GaussianCl
   source.signal?.throwIfAborted();
   const cloud = allocateCloud(count, keptDegree(degree), source);
   unpackSplats(words, chunkBounds, cloud);
-  const meaning = await loadMeaning(header, source.name);
+  const meaning = await loadMetadata(header, source.name);
   meaning?.readComments(cloud, header.comments);
-  meaning?.noteLeftOut(cloud, header, source.name);
+  meaning?.warnDropped(cloud, header, source.name);
   if (sh && !source.isPrefix) readHarmonics(source, header, degree, cloud);
   return cloud;
 }

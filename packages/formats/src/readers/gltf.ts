@@ -72,7 +72,7 @@ async function readSplats(source: SceneSource): Promise<GaussianCloud> {
           source,
         );
   if (others > 0) whole.hints = { ...whole.hints, meshes: true };
-  noteLeftOut(whole, document.json, others > 0);
+  warnDropped(whole, document.json, others > 0);
   return whole;
 }
 
@@ -94,7 +94,7 @@ async function encodeColors(cloud: DraftCloud): Promise<void> {
 const MOST_NAMED = 6;
 
 /** Warns of content that is not drawn. Other warnings of a file with meshes are left to the code that draws these. */
-function noteLeftOut(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
+function warnDropped(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
   const unknown = hasMeshes ? [] : unknownExtensions(json);
   const named = unknown.slice(0, MOST_NAMED).map((extension) => extension.slice(0, 80));
   if (unknown.length > 0) warn(cloud, `Extensions of glTF that are not known are left out: ${named.join(', ')}.`);

@@ -5,7 +5,7 @@ import {
   findGaussians,
   harmonicTargets,
   importMeaning,
-  loadMeaning,
+  loadMetadata,
   withPlainNames,
   type GaussianLayout,
 } from '../ply/gaussian-layout.js';
@@ -21,13 +21,13 @@ import type { SceneSource } from '../scene-format.js';
  */
 export async function readPly(source: SceneSource): Promise<GaussianCloud> {
   const header = withPlainNames(parsePlyHeader(source));
-  const meaning = await loadMeaning(header, source.name);
+  const meaning = await loadMetadata(header, source.name);
   meaning?.refuseOtherMeanings(source.name, header);
   const layout = findGaussians(source, header);
   const data = openElement(source, header, 'vertex');
   const cloud = allocateCloud(data.element.count, keptDegree(layout.degree), source);
   meaning?.readComments(cloud, header.comments);
-  meaning?.noteLeftOut(cloud, header, source.name);
+  meaning?.warnDropped(cloud, header, source.name);
   source.signal?.throwIfAborted();
   const filter = new Float32Array(layout.hasFilter ? cloud.count : 0);
   readAttributes(data, layout, cloud, filter);

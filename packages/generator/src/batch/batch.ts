@@ -1,7 +1,7 @@
 import type { Inputs } from '../input-value.js';
 import { RunLoop } from '../run-loop.js';
 import type { GeneratorSession } from '../runtime/generator-session.js';
-import type { RunOutputs, SessionKind } from '../runtime/live-session.js';
+import type { RunOutputs, SessionKind } from '../runtime/ort-session.js';
 import { groupInstances, inputsOfInstances, stackInputs } from './stack-inputs.js';
 import { StepSessions } from './step-sessions.js';
 
@@ -57,7 +57,7 @@ export class Batch {
   readonly #session: GeneratorSession;
   readonly #varying: ReadonlySet<string>;
   readonly #steps: StepSessions;
-  readonly #seats = new Set<Seat<RunRequest>>();
+  readonly #seats = new Set<BatchSlot<RunRequest>>();
   readonly #loop: RunLoop<true>;
 
   constructor(session: GeneratorSession) {
@@ -79,16 +79,16 @@ export class Batch {
   }
 
   /** Adds an instance. */
-  join<W extends RunRequest>(member: BatchMember<W>): Seat<W> {
-    const seat = new Seat(this, member, {
+  join<W extends RunRequest>(member: BatchMember<W>): BatchSlot<W> {
+    const seat = new BatchSlot(this, member, {
       ask: () => this.#loop.request(true),
-      leave: () => this.#leave(seat as unknown as Seat<RunRequest>),
+      leave: () => this.#leave(seat as unknown as BatchSlot<RunRequest>),
     });
-    this.#seats.add(seat as unknown as Seat<RunRequest>);
+    this.#seats.add(seat as unknown as BatchSlot<RunRequest>);
     return seat;
   }
 
-  #leave(seat: Seat<RunRequest>): void {
+  #leave(seat: BatchSlot<RunRequest>): void {
     this.#seats.delete(seat);
     if (this.#seats.size > 0) return;
     this.#loop.close();
@@ -97,7 +97,7 @@ export class Batch {
     void this.#loop.idle.then(() => this.#steps.release());
   }
 
-  #due(): Seat<RunRequest>[] {
+  #due(): BatchSlot<RunRequest>[] {
     return [...this.#seats].filter((seat) => seat.isDue);
   }
 
@@ -111,10 +111,12 @@ export class Batch {
     }
   }
 
-  async #runGroup(group: readonly { seat: Seat<RunRequest>; request: RunRequest; inputs: Inputs }[]): Promise<void> {
+  async #runGroup(
+    group: readonly { seat: BatchSlot<RunRequest>; request: RunRequest; inputs: Inputs }[],
+  ): Promise<void> {
     const start = performance.now();
-    const failed = new Set<Seat<RunRequest>>();
-    const fail = (seat: Seat<RunRequest>, error: unknown): void => {
+    const failed = new Set<BatchSlot<RunRequest>>();
+    const fail = (seat: BatchSlot<RunRequest>, error: unknown): void => {
       failed.add(seat);
       if (!seat.isClosed) seat.member.onError(error);
     };
@@ -144,7 +146,7 @@ export class Batch {
 }
 
 /** One instance in a batch, with the interface of a {@link RunLoop}. */
-export class Seat<W extends RunRequest> {
+export class BatchSlot<W extends RunRequest> {
   readonly member: BatchMember<W>;
   readonly #batch: Batch;
   readonly #calls: { readonly ask: () => void; readonly leave: () => void };

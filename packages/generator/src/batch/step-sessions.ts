@@ -1,5 +1,5 @@
 import type { GeneratorSession } from '../runtime/generator-session.js';
-import type { SessionKind } from '../runtime/live-session.js';
+import type { SessionKind } from '../runtime/ort-session.js';
 
 /** Number of runs after which an unused session for a number of instances is released. */
 const RUNS_UNTIL_RELEASE = 300;

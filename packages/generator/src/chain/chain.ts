@@ -1,7 +1,7 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import { sameInputs, type Inputs } from '../input-value.js';
 import type { GeneratorSession } from '../runtime/generator-session.js';
-import type { RunOutputs, SessionKind } from '../runtime/live-session.js';
+import type { RunOutputs, SessionKind } from '../runtime/ort-session.js';
 import type { GeneratorModel, ModelSource } from '../runtime/open-model.js';
 import { acquireSession, type AcquireOptions, type SessionLease } from '../runtime/shared-sessions.js';
 import { watchRuntimeBytes } from '../runtime/runtime-progress.js';

@@ -2,7 +2,7 @@ import { numberToHalf } from '@gaussian-splat/core';
 import { ContractError } from '@gaussian-splat/core/contract';
 import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-buffers.js';
 import { elementsOf, type GpuTensor, type Inputs } from '../input-value.js';
-import type { RunOutputs } from '../runtime/live-session.js';
+import type { RunOutputs } from '../runtime/ort-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
 import type { Connection } from './connect.js';
 

@@ -1,6 +1,6 @@
 import type { StateInput } from '@gaussian-splat/core/contract';
 import type { GpuTensor, Inputs } from '../input-value.js';
-import type { RunOutputs } from '../runtime/live-session.js';
+import type { RunOutputs } from '../runtime/ort-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
 import { HandOver } from './hand-over.js';
 

@@ -1,6 +1,6 @@
 import { elementsOf, isOnGpu, type GpuTensor, type Inputs } from '../input-value.js';
 import type { Evidence } from '../proof/prove.js';
-import type { FixedOutput, RunOutputs } from './live-session.js';
+import type { FixedOutput, RunOutputs } from './ort-session.js';
 import type { GeneratorModel } from './open-model.js';
 import { ELEMENT_BYTES, readTensors, TENSOR_USAGE } from './tensor-buffers.js';
 

@@ -6,7 +6,7 @@ import { bindPictures } from '../bind-pictures.js';
 import type { Inputs } from '../input-value.js';
 import type { GeneratorState } from '../state.js';
 import { WeightRelease } from './cadence.js';
-import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
+import type { OrtSession, RunOutputs, SessionKind } from './ort-session.js';
 import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { earlierVerdict, prove, type Evidence } from '../proof/prove.js';
@@ -35,7 +35,7 @@ export class GeneratorSession {
   readonly #end = new AbortController();
   readonly #oneInstance: OnnxHeader;
   readonly #weights: WeightRelease;
-  #live: Promise<LiveSession> | undefined;
+  #live: Promise<OrtSession> | undefined;
   #kind: SessionKind | undefined;
   #failures = 0;
   #lastFailure: unknown;
@@ -65,7 +65,7 @@ export class GeneratorSession {
     this.#onFallback = onFallback;
     this.#compare = compare;
     this.#oneInstance = oneInstance(model.header, model.contract);
-    this.#weights = new WeightRelease(model, () => void this.#releaseLive());
+    this.#weights = new WeightRelease(model, () => void this.#releaseDynamic());
     requireRoom(model, device);
     void device.lost.then(() => {
       this.#isLost = true;
@@ -166,7 +166,7 @@ export class GeneratorSession {
     this.#requireLife();
   }
 
-  async #started(starting: Promise<LiveSession>): Promise<LiveSession> {
+  async #started(starting: Promise<OrtSession>): Promise<OrtSession> {
     try {
       return await starting;
     } catch (error) {
@@ -187,11 +187,11 @@ export class GeneratorSession {
     this.#isReleased = true;
     this.#weights.runBegins();
     this.#end.abort();
-    await this.#releaseLive();
+    await this.#releaseDynamic();
   }
 
   /** Releases the runtime's session and its weights; a later run starts another. */
-  async #releaseLive(): Promise<void> {
+  async #releaseDynamic(): Promise<void> {
     const live = this.#live;
     this.#live = undefined;
     await live?.then(
@@ -200,7 +200,7 @@ export class GeneratorSession {
     );
   }
 
-  async #start(inputs: Inputs, onFirstRun: (outputs: RunOutputs) => void): Promise<LiveSession> {
+  async #start(inputs: Inputs, onFirstRun: (outputs: RunOutputs) => void): Promise<OrtSession> {
     const { model, device } = this;
     const requireLife = (): void => this.#requireLife();
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
@@ -231,11 +231,11 @@ export class GeneratorSession {
     if (verdict.result !== 'different' || this.#kind === 'wasm') return;
     this.#refusal = verdict.reason;
     this.#kind = 'wasm';
-    void this.#releaseLive();
+    void this.#releaseDynamic();
     this.#onFallback(verdict.reason);
   }
 
-  async #afterFailure(live: LiveSession, starting: Promise<LiveSession>, error: unknown): Promise<unknown> {
+  async #afterFailure(live: OrtSession, starting: Promise<OrtSession>, error: unknown): Promise<unknown> {
     const isGone = error instanceof RuntimeGone;
     if (!live.hasFailed && !isGone) return error;
     const isFirst = this.#live === starting;

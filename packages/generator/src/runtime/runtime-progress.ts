@@ -16,7 +16,7 @@ let state: readonly [loaded: number, total: number] | null | undefined;
 /** Reports the received bytes of the runtime. @param progress null at the end, undefined after a failure. */
 export function noteRuntimeBytes(progress: typeof state): void {
   state = progress;
-  for (const listener of listeners) tell(listener);
+  for (const listener of listeners) notify(listener);
   if (progress === null) listeners.clear();
 }
 
@@ -31,11 +31,11 @@ export function watchRuntimeBytes(listener: ProgressListener): () => void {
     return () => undefined;
   }
   listeners.add(listener);
-  tell(listener);
+  notify(listener);
   return () => listeners.delete(listener);
 }
 
-function tell(listener: ProgressListener): void {
+function notify(listener: ProgressListener): void {
   const total = state?.[1] ?? WASM_BYTES[wasmBuild()];
   listener(state === null ? total : (state?.[0] ?? 0), total);
 }

@@ -4,7 +4,7 @@ import { isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-
 import type { Evidence } from '../proof/prove.js';
 import { cadenceOf } from './cadence.js';
 import { copyOf, evidenceOf, isEqual, readRun, type WrittenRun } from './first-run.js';
-import { LiveSession, type FixedOutputs, type RunOutputs, type SessionKind } from './live-session.js';
+import { OrtSession, type FixedOutputs, type RunOutputs, type SessionKind } from './ort-session.js';
 import { loadRuntime, RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { TENSOR_USAGE } from './tensor-buffers.js';
@@ -34,7 +34,7 @@ export interface StartOptions {
 
 /** A session that has run, and the output of its first run on the GPU, if that is to be compared. */
 export interface StartedSession {
-  readonly session: LiveSession;
+  readonly session: OrtSession;
   readonly evidence?: Evidence;
 }
 
@@ -87,7 +87,7 @@ async function startOnGpu(options: StartOptions, refusals: string[]): Promise<St
   const evidence = keepsEvidence ? await evidenceOf(device, options.inputs, plain.written) : undefined;
   if (!isRecordable) return { session: plain.session, evidence };
   const others = otherInputs(options);
-  let session: LiveSession | undefined;
+  let session: OrtSession | undefined;
   try {
     session = await startRecorded(options, plain, { ...options, inputs: others.inputs }, refusals, fixed);
   } finally {
@@ -104,7 +104,7 @@ async function startRecorded(
   changed: StartOptions,
   refusals: string[],
   fixed: FixedOutputs,
-): Promise<LiveSession | undefined> {
+): Promise<OrtSession | undefined> {
   const expected = await attempt(plain.session, changed, []);
   if (expected === undefined) {
     await plain.session.release();
@@ -195,7 +195,7 @@ function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
 }
 
 interface Started {
-  readonly session: LiveSession;
+  readonly session: OrtSession;
   /** Output of its first run. */
   readonly written: WrittenRun;
 }
@@ -210,9 +210,9 @@ async function start(
   const { model, device, requireLife } = options;
   requireLife();
   const runtime = await loadRuntime();
-  let session: LiveSession;
+  let session: OrtSession;
   try {
-    session = await LiveSession.create(kind, runtime, model, device, fixed);
+    session = await OrtSession.create(kind, runtime, model, device, fixed);
   } catch (error) {
     if (error instanceof RuntimeGone) throw error;
     refusals.push(`${kind}: ${messageOf(error)}`);
@@ -231,7 +231,7 @@ async function start(
 
 /** One run, and ranges of its output; undefined if it fails. @throws RuntimeGone, after releasing the session. */
 async function attempt(
-  session: LiveSession,
+  session: OrtSession,
   { device, inputs, model }: StartOptions,
   refusals: string[],
   onOutputs?: (outputs: RunOutputs) => void,

@@ -7,14 +7,14 @@ import type { SceneLoader } from '../loading/scene-loader.js';
 import type { ReadControls } from './values.js';
 
 /** State of a model that a page sets, apart from the camera. Names are case-insensitive. */
-export interface LiveState extends ReadControls {
+export interface DynamicState extends ReadControls {
   readonly timeSeconds: number;
   /** Flattened; undefined for the model's rest pose. */
   readonly pose: readonly number[] | undefined;
 }
 
 /** Listeners of a model. */
-export interface LiveListeners {
+export interface DynamicListeners {
   /** Called when a frame for a time is ready to be drawn. */
   readonly onFrame: (timeSeconds: number) => void;
   /** Called when the frame at a time is shown by the frame being drawn. */
@@ -40,7 +40,7 @@ export interface Timeline {
   /** Inputs that `control-NAME` sets; absent if there are none. */
   readonly settable?: readonly string[];
   /** Requests the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
-  request(state: LiveState, camera: Camera): void;
+  request(state: DynamicState, camera: Camera): void;
   /** Whether the frame at a time is not loaded, so that the clock waits; absent if it never waits. */
   isLacking?(timeSeconds: number): boolean;
   /** [start, end] of the times that need no more bytes, seconds; absent for all. */
@@ -49,13 +49,13 @@ export interface Timeline {
 }
 
 /** The generator of a scene, with the first frame in its Gaussians. */
-export interface LiveModel extends Timeline {
+export interface DynamicModel extends Timeline {
   readonly gaussians: DynamicGaussians;
   readonly bounds: SceneBounds;
 }
 
 /** Location of a generator, and the state of its first frame. */
-export interface LiveRequest {
+export interface DynamicRequest {
   readonly url: string;
   /** Addresses of models that each receive the Gaussians of the previous one. */
   readonly chain?: readonly string[];
@@ -72,12 +72,12 @@ export interface LiveRequest {
   readonly loader: SceneLoader;
   /** Limits of the model's load. */
   readonly limits?: SceneLimits | undefined;
-  readonly state: () => LiveState;
+  readonly state: () => DynamicState;
   /** Whether playback restarts at its end. */
   readonly loops: () => boolean;
   /** False if controls may belong to another model, which then reports unknown ones. */
   readonly ownsControls: () => boolean;
   /** A camera for the bounds that the contract declares, or for unknown ones. */
   readonly camera: (bounds: SceneBounds | undefined) => Camera;
-  readonly listeners: LiveListeners;
+  readonly listeners: DynamicListeners;
 }

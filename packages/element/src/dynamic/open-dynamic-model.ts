@@ -9,8 +9,8 @@ import { pictures as frames, unlessWrong, type OpenOptions } from '../gpu/open-s
 import type { DeviceLease } from '../gpu/shared-device.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { inputsOf } from './inputs.js';
-import type { LiveModel, LiveRequest } from './live-model.js';
-import { LivePictures } from './live-pictures.js';
+import type { DynamicModel, DynamicRequest } from './dynamic-model.js';
+import { InputImages } from './input-images.js';
 import { fetchBeside, readsHeaders } from './model-files.js';
 import { compareOf, offerPanel } from './of-element.js';
 import { StateReader } from './read-state.js';
@@ -48,19 +48,19 @@ export const upOf = ({ coordinates }: Contract): Vector3 | undefined =>
 const WARM_UP = 0.25;
 
 /** Opens the scene of a generator. @param lease The caller releases it if this rejects. */
-export async function openLiveScene(
+export async function openDynamicScene(
   request: SceneRequest,
   options: OpenOptions,
   lease: DeviceLease,
 ): Promise<LoadedGaussians> {
   const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
-  let live: LiveModel | undefined;
+  let live: DynamicModel | undefined;
   try {
     signal.throwIfAborted();
     limitScenes(lease.device, memoryBudget);
     const starting = startVariants(lease.device, frames()).catch(unlessWrong);
     starting.catch(() => undefined);
-    live = await openLiveModel(
+    live = await openDynamicModel(
       { ...options.live(), ...request, memoryBudget },
       lease.device,
       signal,
@@ -78,13 +78,13 @@ export async function openLiveScene(
 }
 
 /** Opens a generator, with its first run in its Gaussians. Rejects with GaussianSplatError, or the signal's reason. */
-async function openLiveModel(
-  request: LiveRequest,
+async function openDynamicModel(
+  request: DynamicRequest,
   device: GPUDevice,
   signal: AbortSignal,
   onProgress: ProgressListener,
   place: Promise<WaitingPlace>,
-): Promise<LiveModel> {
+): Promise<DynamicModel> {
   if (request.runtimeLocation !== null) setRuntimeLocation(new URL(request.runtimeLocation, document.baseURI));
   let firstFailure: unknown;
   let isOpen = false;
@@ -107,7 +107,7 @@ async function openLiveModel(
   // Closed early when it is aborted.
   signal.addEventListener('abort', () => !isOpen && generator.close(), { once: true });
   let gaussians: DynamicGaussians | undefined;
-  let pictures: LivePictures | undefined;
+  let pictures: InputImages | undefined;
   try {
     const { models, model } = generator;
     for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
@@ -119,7 +119,7 @@ async function openLiveModel(
     const { onInput: onChange, onError } = listeners;
     const { credentials } = request;
     const whenIdle = (): Promise<void> => generator.idle;
-    pictures = new LivePictures(device, models, new Set(), { credentials, signal, onChange, onError, whenIdle });
+    pictures = new InputImages(device, models, new Set(), { credentials, signal, onChange, onError, whenIdle });
     const live = liveModel(generator, gaussians, pictures, request);
     const declared = declaredBounds(model.contract);
     pictures.update(request.state().pictures);
@@ -162,9 +162,9 @@ async function openLiveModel(
 function liveModel(
   generator: Generator,
   gaussians: DynamicGaussians,
-  pictures: LivePictures,
-  { listeners, ownsControls }: LiveRequest,
-): Omit<LiveModel, 'bounds'> {
+  pictures: InputImages,
+  { listeners, ownsControls }: DynamicRequest,
+): Omit<DynamicModel, 'bounds'> {
   const { models, model } = generator;
   const up = upOf(model.contract);
   const reader = new StateReader(models, listeners.onError);
@@ -192,14 +192,14 @@ function liveModel(
 }
 
 /** Sources of the generator, and of those that follow it in a chain. The contract of the page is that of the first. */
-async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<ModelSource[]> {
+async function sourcesOf(request: DynamicRequest, signal: AbortSignal): Promise<ModelSource[]> {
   const { url, chain = [], credentials } = request;
   const contract = await contractOf(request, signal);
   const openHeader = readsHeaders(request.loader, request.limits);
   return [{ url, credentials, contract, openHeader }, ...chain.map((next) => ({ url: next, credentials, openHeader }))];
 }
 
-async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<unknown> {
+async function contractOf(request: DynamicRequest, signal: AbortSignal): Promise<unknown> {
   const { credentials } = request;
   // Templates write empty attributes; an empty address would be that of the page.
   const contract = typeof request.contract === 'string' ? request.contract.trim() : request.contract;

@@ -3,8 +3,8 @@ import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
 import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { OpenOptions } from '../gpu/open-scene.js';
-import type { LiveRequest, Timeline } from './live-model.js';
-import type { LivePictures } from './live-pictures.js';
+import type { DynamicRequest, Timeline } from './dynamic-model.js';
+import type { InputImages } from './input-images.js';
 
 /** Destination of a scene without splats meanwhile. */
 export type WaitingPlace = Pick<OpenOptions, 'device' | 'onPreview' | 'submissions'>;
@@ -23,8 +23,8 @@ const UNIT_BALL: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 
 export async function waitForImages(
   { inputs, settable }: Pick<Timeline, 'inputs' | 'settable'>,
   { layout }: Pick<GaussianModelFile, 'layout'>,
-  pictures: LivePictures,
-  { request, signal, place }: { request: LiveRequest; signal: AbortSignal; place: WaitingPlace },
+  pictures: InputImages,
+  { request, signal, place }: { request: DynamicRequest; signal: AbortSignal; place: WaitingPlace },
 ): Promise<void> {
   await new Promise<void>((resolve, reject) => {
     const look = (): void => {

@@ -7,7 +7,7 @@ import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { FileRequest, LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { FrameRoom } from './frame-room.js';
-import type { LiveListeners, LiveState, Timeline } from './live-model.js';
+import type { DynamicListeners, DynamicState, Timeline } from './dynamic-model.js';
 
 export interface SequenceOptions {
   readonly request: SceneRequest;
@@ -15,7 +15,7 @@ export interface SequenceOptions {
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
   readonly onProgress: ProgressListener;
-  readonly listeners: LiveListeners;
+  readonly listeners: DynamicListeners;
   readonly frameUrl: (url: string) => string;
   readonly loops: () => boolean;
   readonly memoryBudget: number | undefined;
@@ -92,14 +92,14 @@ export class SequencePlayer implements Timeline {
   }
 
   /** Shows the frame at a time, if it is loaded; fetches the following ones. */
-  request({ timeSeconds }: LiveState): void {
+  request({ timeSeconds }: DynamicState): void {
     const frame = this.#frameAt(timeSeconds);
     this.#showLate(frame);
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
     if (frame !== this.#shown && slot?.packed) this.#show(frame);
     // An unavailable frame is skipped, so that a seek to it ends.
-    if (frame === this.#shown || this.#isMissing(frame)) this.#tell(timeSeconds);
+    if (frame === this.#shown || this.#isMissing(frame)) this.#notify(timeSeconds);
   }
 
   /** The newest of the late frames: if every frame is late, playback follows the clock with a delay. */
@@ -133,7 +133,7 @@ export class SequencePlayer implements Timeline {
   }
 
   /** After the submission of the current frame. */
-  #tell(timeSeconds: number): void {
+  #notify(timeSeconds: number): void {
     queueMicrotask(() => this.#isClosed || this.#options.listeners.onShown(timeSeconds));
   }
 

@@ -86,7 +86,7 @@ const READ =
   /^(filter_3D|f_rest_\d+|alpha|(obj|sem|semantic|instance|label|class|object|segment|confidence|kl|id)(_.*)?)$/i;
 
 /** Warns of content that is not drawn, or may be misinterpreted. */
-export function noteLeftOut(cloud: DraftCloud, { elements }: PlyHeader, fileName: string): void {
+export function warnDropped(cloud: DraftCloud, { elements }: PlyHeader, fileName: string): void {
   const properties = (name: string): string[] =>
     elements
       .filter((element) => element.name === name)
@@ -127,7 +127,7 @@ export function noteActivated(cloud: DraftCloud, hasLargeScales: boolean): void 
 }
 
 /** Other kinds of splats whose property names may be the same: recognized by a unique name. */
-const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
+const OTHER_SPLAT_TYPES: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
   {
     mark: /^(trbf_center|motion_\d+|omega_\d+)$/,
     found: 'SpacetimeGaussians, which move and whose f_dc_* are plain colours',
@@ -153,13 +153,13 @@ const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; 
 /** Throws `decode/unsupported` if names show that the numbers have another meaning than in plain splats. */
 export function refuseOtherMeanings(where: string, { elements }: PlyHeader): void {
   const names = elements.flatMap(({ name, properties }) => [name, ...properties.map((property) => property.name)]);
-  for (const { mark, found, remedy } of OTHER_MEANINGS) {
-    const told = names.filter((name) => mark.test(name));
-    if (told.length === 0) continue;
+  for (const { mark, found, remedy } of OTHER_SPLAT_TYPES) {
+    const marked = names.filter((name) => mark.test(name));
+    if (marked.length === 0) continue;
     throw new GaussianSplatError('decode/unsupported', {
       where: `${where}, PLY header`,
       expected: 'plain Gaussian splats',
-      found: `${found} (${told.slice(0, 3).join(', ')})`,
+      found: `${found} (${marked.slice(0, 3).join(', ')})`,
       remedy,
     });
   }

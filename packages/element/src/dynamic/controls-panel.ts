@@ -101,7 +101,7 @@ export class ControlsPanel {
   readonly #followed = new WeakSet<Owner>();
   /** Functions that update each control to its current value. */
   #followers: (() => void)[] = [];
-  #told = '';
+  #reported = '';
 
   private constructor(element: PanelHost) {
     this.#element = element;
@@ -131,9 +131,9 @@ export class ControlsPanel {
   #update(): void {
     const owners = this.#owners;
     this.#box.hidden = !this.#element.controlsPanel || owners.length === 0;
-    const told = JSON.stringify(owners.map((owner) => [this.#titleOf(owner), owner.inputs]));
-    if (told === this.#told || this.#box.hidden) return;
-    this.#told = told;
+    const reported = JSON.stringify(owners.map((owner) => [this.#titleOf(owner), owner.inputs]));
+    if (reported === this.#reported || this.#box.hidden) return;
+    this.#reported = reported;
     this.#followers = [];
     for (const owner of owners) {
       // Values that the page sets are shown, too.
@@ -279,7 +279,7 @@ export class ControlsPanel {
       const pose = this.#poses.get(owner);
       if (pose) owner.pose = pose.last = pose.given ?? null;
     }
-    this.#told = '';
+    this.#reported = '';
     this.#update();
     this.#box.querySelector('summary')?.focus();
   }

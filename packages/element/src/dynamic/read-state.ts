@@ -1,7 +1,7 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { Contract, ControlInput, InputBinding } from '@gaussian-splat/core/contract';
 import type { GeneratorModel, GeneratorState, GpuTensor } from '@gaussian-splat/generator';
-import type { LiveState } from './live-model.js';
+import type { DynamicState } from './dynamic-model.js';
 import { valueOf } from './values.js';
 
 /** Converts the state of the page to that of a generator. Invalid values are corrected and reported, each once. */
@@ -18,7 +18,7 @@ export class StateReader {
 
   /** @param others Names that another model has; null if that one reports unknown names. */
   read(
-    state: LiveState,
+    state: DynamicState,
     camera: Camera,
     pictures: Readonly<Record<string, GpuTensor>>,
     others: readonly string[] | null,
@@ -31,7 +31,7 @@ export class StateReader {
       if (binding.role === 'shape') shape = value;
       if (binding.role !== 'control') continue;
       const picture = valueOf(state.pictures, name);
-      if (picture !== undefined) this.#tell(name, 'numbers', String(picture).slice(0, 60), 'its default counts');
+      if (picture !== undefined) this.#notify(name, 'numbers', String(picture).slice(0, 60), 'its default counts');
       if (value !== undefined) controls[name] = this.#inRange(name, binding, value);
     }
     if (others) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.pictures)], others);
@@ -45,7 +45,7 @@ export class StateReader {
   ): number | readonly number[] {
     const inside = values.map((value) => Math.min(most, Math.max(least, value)));
     if (inside.some((value, i) => value !== values[i])) {
-      this.#tell(name, `${least} to ${most}`, values.slice(0, 4).join(' '), 'the nearest value within counts');
+      this.#notify(name, `${least} to ${most}`, values.slice(0, 4).join(' '), 'the nearest value within counts');
     }
     return inside.length === 1 ? inside[0] : inside;
   }
@@ -61,17 +61,17 @@ export class StateReader {
     for (const name of names) {
       if (known.some((input) => input === name || input.toLowerCase() === name)) continue;
       const expected = known.length > 0 ? `one of the inputs ${known.join(', ')}` : 'no control: the model has none';
-      this.#tell(name, expected, 'a name that no input has', 'correct the name, or leave it out');
+      this.#notify(name, expected, 'a name that no input has', 'correct the name, or leave it out');
     }
   }
 
   /** Reports a pose that no model accepts. */
-  checkPose({ pose }: LiveState): void {
+  checkPose({ pose }: DynamicState): void {
     if (pose === undefined || Object.values(this.#inputs).some(({ role }) => role === 'pose')) return;
     this.#say('pose', 'none: the model takes no pose', `${pose.length} numbers`, 'leave it out');
   }
 
-  #tell(name: string, expected: string, found: string, remedy: string): void {
+  #notify(name: string, expected: string, found: string, remedy: string): void {
     this.#say(`control ${name}`, expected, found, remedy);
   }
 

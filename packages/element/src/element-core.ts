@@ -23,16 +23,16 @@ import { isGone } from './gpu/device-failures.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
-import type { LodSettings, Drawable, ReadCounts } from './gpu/painter.js';
+import type { LodSettings, Drawable, ReadCounts } from './gpu/backend.js';
 import type { SceneRequest } from './loading/protocol.js';
-import type { Frame } from './live/frame-filter.js';
-import type { GeneratorInput } from './live/inputs.js';
-import type { SoundHost } from './live/sound.js';
-import type { LiveWiring } from './live/live-wiring.js';
+import type { Frame } from './dynamic/frame-filter.js';
+import type { GeneratorInput } from './dynamic/inputs.js';
+import type { SoundHost } from './dynamic/sound.js';
+import type { DynamicWiring } from './dynamic/dynamic-wiring.js';
 import type { QueryHost } from './position-from-point.js';
 import { SourceEntry, type SourceOwner } from './source-entry.js';
 import { SourceList } from './source-list.js';
-import type { Services, StageHost } from './stage-host.js';
+import type { Services, ElementHost } from './element-host.js';
 import { statsOf, type SceneStats } from './stats.js';
 import type { TemplateModel } from './template.js';
 import type { TourHost } from './views/tour.js';
@@ -42,7 +42,7 @@ import type { SpokenStrings } from './words.js';
  * Connects the source list, camera, size, visibility and input of an element behind its attributes and markup. It
  * implements the host interface of each controller.
  */
-export class Stage
+export class ElementCore
   implements SourceOwner, ViewHost, RevealHost, HotspotHost, InputHost, BehaviourHost, QueryHost, TourHost
 {
   readonly element: ReactiveControllerHost & HTMLElement;
@@ -56,7 +56,7 @@ export class Stage
   drawnFrom: Camera | undefined;
   readonly view: ViewController;
   readonly hasOwnClock = true;
-  readonly #host: StageHost;
+  readonly #host: ElementHost;
   readonly #visibility: VisibilityController;
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
@@ -100,7 +100,7 @@ export class Stage
   );
   /** An `<audio>` or `<video>` element of the page that plays along with a moving scene. */
   readonly #sound = new Lazy('the code for sound', async () => {
-    const { Sound } = await import('./live/sound.js');
+    const { Sound } = await import('./dynamic/sound.js');
     const sound = new Sound(this.element as unknown as SoundHost);
     sound.update();
     return sound;
@@ -144,7 +144,7 @@ export class Stage
   /** Set while input is enabled. */
   handsView: TemplateModel['handsView'];
 
-  constructor(element: ReactiveControllerHost & HTMLElement, host: StageHost) {
+  constructor(element: ReactiveControllerHost & HTMLElement, host: ElementHost) {
     this.element = element;
     this.#host = host;
     this.camera = new CameraController(host.attributes.camera, () => this.requestFrame());
@@ -186,12 +186,12 @@ export class Stage
     return this.#host.services;
   }
 
-  get source(): StageHost['source'] {
+  get source(): ElementHost['source'] {
     return this.#host.source;
   }
 
-  get liveValues(): StageHost['liveValues'] {
-    return this.#host.liveValues;
+  get dynamicValues(): ElementHost['dynamicValues'] {
+    return this.#host.dynamicValues;
   }
 
   get strings(): SpokenStrings {
@@ -239,23 +239,23 @@ export class Stage
 
   /** The clock of the element. */
   get playback(): PlaybackController {
-    return this.sources.own.ownClock;
+    return this.sources.ownEntry.ownClock;
   }
 
-  get live(): LiveWiring {
-    return this.sources.own.live;
+  get live(): DynamicWiring {
+    return this.sources.ownEntry.live;
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null if there is nothing to draw. */
   drawNow(...picture: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
-    return this.sources.own.scene.isPreview ? null : this.view.drawNow(...picture);
+    return this.sources.ownEntry.scene.isPreview ? null : this.view.drawNow(...picture);
   }
 
   /** Frames the scene again, as after loading; the scene of a generator is measured first. */
   async updateFraming(): Promise<void> {
-    const { scene } = this.sources.own.scene;
+    const { scene } = this.sources.ownEntry.scene;
     const bounds = await this.sources.readBounds();
-    if (bounds && this.sources.own.scene.scene === scene) this.camera.frame(bounds);
+    if (bounds && this.sources.ownEntry.scene.scene === scene) this.camera.frame(bounds);
   }
 
   /** Statistics of the displayed scene; null if there is none. */
@@ -267,8 +267,8 @@ export class Stage
       dynamicQuality: this.view.dynamicQuality,
       counts: this.#counts,
       isPreview,
-      frameBytes: this.view.painter?.byteLength ?? 0,
-      pixelShare: this.view.painter?.pixelShare,
+      frameBytes: this.view.backend?.byteLength ?? 0,
+      pixelShare: this.view.backend?.pixelShare,
       pixels: levels.detail,
       parts,
     });
@@ -276,33 +276,33 @@ export class Stage
 
   /** Reads the counts of the current image back from the GPU. */
   async updateStats(): Promise<SceneStats | null> {
-    const { painter } = this.view;
+    const { backend } = this.view;
     const camera = this.drawnFrom;
-    if (painter === null || camera === undefined) return this.stats;
+    if (backend === null || camera === undefined) return this.stats;
     try {
-      const counts = await painter.readCounts(camera);
-      if (this.view.painter === painter) this.#counts = counts;
+      const counts = await backend.readCounts(camera);
+      if (this.view.backend === backend) this.#counts = counts;
     } catch (error) {
       // The renderer was replaced meanwhile; the other statistics do not need it.
-      if (!(await isGone(painter))) throw error;
+      if (!(await isGone(backend))) throw error;
     }
     return this.stats;
   }
 
   /** Inputs of the displayed models that the page may set. */
   get inputs(): readonly GeneratorInput[] {
-    return [...this.sources.own.inputs, ...(this.view.painter?.filter?.inputs ?? [])];
+    return [...this.sources.ownEntry.inputs, ...(this.view.backend?.filter?.inputs ?? [])];
   }
 
   /** Seeks the clock of the displayed scene, or of the next one if the page requests another. */
   seek(seconds: number): void {
-    if (this.sources.own.isLeaving) this.playback.startNextAt(seconds);
+    if (this.sources.ownEntry.isLeaving) this.playback.startNextAt(seconds);
     else this.playback.currentTime = seconds;
   }
 
   /** Playback is requested: dismisses the poster and loads a scene that is out of view. */
   prepareToPlay(): void {
-    this.sources.own.needNow();
+    this.sources.ownEntry.needNow();
     if (!this.reveal.mayReveal) this.reveal.dismiss();
     this.element.requestUpdate();
   }
@@ -382,12 +382,12 @@ export class Stage
 
   /** Rotation from the world, the frame of the element's own scene, to viewer space. */
   get frame(): ViewerFrame {
-    return frameOf(this.attributes, { up: this.sources.own.member?.scene.bounds.up });
+    return frameOf(this.attributes, { up: this.sources.ownEntry.member?.scene.bounds.up });
   }
 
   /** The request of a scene that has a file with a floor; null while there is none. */
   get walkable(): SceneRequest | null {
-    const { scene } = this.sources.own;
+    const { scene } = this.sources.ownEntry;
     return scene.state === 'ready' && !scene.scene?.live ? scene.shownRequest : null;
   }
 
@@ -405,7 +405,7 @@ export class Stage
 
   /** Reads surface positions of the last frame. Rejects if the frame is gone. */
   async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
-    const answers = (await this.view.painter?.probe(points)) ?? [];
+    const answers = (await this.view.backend?.probe(points)) ?? [];
     return this.sources.meshes.value?.probe(points, answers) ?? answers;
   }
 
@@ -459,7 +459,7 @@ export class Stage
   draw(scene: Drawable): Promise<void> {
     this.#print.get().catch(this.#warnOf);
     const drawn = this.view.show(scene);
-    this.live.attachPost(this.view.painter);
+    this.live.attachPost(this.view.backend);
     return drawn;
   }
 
@@ -474,7 +474,7 @@ export class Stage
 
   posterDismissed(): void {
     this.dispatch(new Event('poster-dismissed'));
-    this.sources.own.hasBegun = false;
+    this.sources.ownEntry.hasBegun = false;
     this.sources.startPlaying();
   }
 
@@ -516,9 +516,9 @@ export class Stage
   }
 
   #updated(): void {
-    this.sources.own.update();
-    this.live.wantPost(this.sources.own.postprocess);
-    if (!this.sources.own.isLeaving) this.playback.keepScene();
+    this.sources.ownEntry.update();
+    this.live.wantPost(this.sources.ownEntry.postprocess);
+    if (!this.sources.ownEntry.isLeaving) this.playback.keepScene();
     if (this.attributes.views) this.tour.want(this.#warnOf);
     if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
     const { vr, ar, measure, shadowIntensity, revealEffect } = this.attributes;

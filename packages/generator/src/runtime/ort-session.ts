@@ -41,7 +41,7 @@ export type FixedOutputs = Record<string, FixedOutput>;
 const QUIET = { logSeverityLevel: 4 } as const;
 
 /** A session of ONNX Runtime with its inputs and outputs on the GPU. After a failed run it must not be used again. */
-export class LiveSession {
+export class OrtSession {
   readonly kind: SessionKind;
   readonly #runtime: Runtime;
   readonly #session: InferenceSession;
@@ -87,7 +87,7 @@ export class LiveSession {
     model: GeneratorModel,
     device: GPUDevice,
     fixed: Readonly<FixedOutputs> = {},
-  ): Promise<LiveSession> {
+  ): Promise<OrtSession> {
     const options: InferenceSession.SessionOptions = {
       ...QUIET,
       freeDimensionOverrides: fixedDimensions(model),
@@ -107,7 +107,7 @@ export class LiveSession {
         ...(kind === 'wasm' ? { executionProviders: ['wasm'] } : onGpu),
       }),
     );
-    return new LiveSession(kind, runtime, session, device, model, fixed);
+    return new OrtSession(kind, runtime, session, device, model, fixed);
   }
 
   /** Whether a run has failed. */

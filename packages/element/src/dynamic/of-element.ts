@@ -1,6 +1,6 @@
 /** Attributes of the element that only late-loaded code for models reads. */
 import { Lazy } from '@gaussian-splat/core';
-import type { LiveRequest } from './live-model.js';
+import type { DynamicRequest } from './dynamic-model.js';
 
 interface ModelElement extends HTMLElement {
   readonly compare?: string | null;
@@ -11,7 +11,7 @@ interface ModelElement extends HTMLElement {
 export const compareOf = ({
   element,
   loader,
-}: Pick<LiveRequest, 'element' | 'loader'>): false | LiveRequest['loader']['spawn'] =>
+}: Pick<DynamicRequest, 'element' | 'loader'>): false | DynamicRequest['loader']['spawn'] =>
   ((element as ModelElement).compare ?? element.getAttribute('compare'))?.trim() === 'off' ? false : loader.spawn;
 
 const ownerOf = (element: HTMLElement): ModelElement | null =>
@@ -37,8 +37,8 @@ export function offerPanel(element: HTMLElement): void {
       ControlsPanel.show(host as Parameters<typeof ControlsPanel.show>[0]);
     }
   };
-  const showOrTell = (): void => void show().catch((error: unknown) => console.warn('<gaussian-splat>:', error));
-  element.addEventListener('inputs-change', showOrTell);
+  const showOrReport = (): void => void show().catch((error: unknown) => console.warn('<gaussian-splat>:', error));
+  element.addEventListener('inputs-change', showOrReport);
   const owner = ownerOf(element);
-  if (owner) new MutationObserver(showOrTell).observe(owner, { attributeFilter: ['controls-panel'] });
+  if (owner) new MutationObserver(showOrReport).observe(owner, { attributeFilter: ['controls-panel'] });
 }

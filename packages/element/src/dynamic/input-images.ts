@@ -7,7 +7,7 @@ import { valueOf, type ImageSource, type ImageSources } from './values.js';
 /** Maximum size of an image file in bytes. */
 const MAX_IMAGE = 2 ** 28;
 
-export interface LivePicturesOptions {
+export interface InputImagesOptions {
   readonly credentials: RequestCredentials;
   readonly signal: AbortSignal;
   /** Called when all named images have arrived, or failed. */
@@ -24,9 +24,9 @@ type WantedShape = ReturnType<typeof imageShapeOf>;
  * Image inputs of models: fetched, cropped to the model's proportions and resampled on the GPU whenever the page names
  * others.
  */
-export class LivePictures {
+export class InputImages {
   readonly #device: GPUDevice;
-  readonly #options: LivePicturesOptions;
+  readonly #options: InputImagesOptions;
   readonly #shapes = new Map<string, WantedShape>();
   readonly #sources = new Map<string, ImageSources>();
   readonly #tensors: Record<string, ImageTensor> = {};
@@ -38,7 +38,7 @@ export class LivePictures {
     device: GPUDevice,
     models: readonly GeneratorModel[],
     given: ReadonlySet<string>,
-    options: LivePicturesOptions,
+    options: InputImagesOptions,
   ) {
     this.#device = device;
     this.#options = options;
@@ -147,7 +147,7 @@ function isSame(a: ImageSources, b: ImageSources | undefined): boolean {
 async function pixelsOf(
   name: string,
   source: ImageSource,
-  options: LivePicturesOptions,
+  options: InputImagesOptions,
 ): Promise<GPUCopyExternalImageSource> {
   if (source instanceof HTMLImageElement) {
     await source.decode().catch((cause: unknown) => {
@@ -165,7 +165,7 @@ async function pixelsOf(
   );
 }
 
-async function fetchPicture(url: string, options: LivePicturesOptions): Promise<Blob> {
+async function fetchPicture(url: string, options: InputImagesOptions): Promise<Blob> {
   return new Blob([
     await fetchBeside(url, options, MAX_IMAGE, 'the image that the control names', 'check the address'),
   ]);

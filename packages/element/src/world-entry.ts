@@ -3,7 +3,7 @@ import type { SceneBounds } from './camera/settings.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 
 /** A loaded source in the world. */
-export class Member {
+export class WorldEntry {
   readonly scene: LoadedGaussians;
   readonly #world: World;
   #placement: Placement;

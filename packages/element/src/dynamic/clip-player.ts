@@ -5,17 +5,17 @@ import type { PackedAnimation } from '@gaussian-splat/renderer/tools';
 import type { SceneBounds } from '../camera/settings.js';
 import type { OpenedClip } from '../loading/clip-of.js';
 import type { ClipAnswer, ClipRequest, SceneRequest } from '../loading/protocol.js';
-import type { Here, SceneLoader } from '../loading/scene-loader.js';
+import type { SceneWorker, SceneLoader } from '../loading/scene-loader.js';
 import { GroupCache } from './group-cache.js';
 import { GroupSlots } from './group-slots.js';
-import type { LiveListeners, LiveState, Timeline } from './live-model.js';
+import type { DynamicListeners, DynamicState, Timeline } from './dynamic-model.js';
 
 export interface ClipOptions {
   readonly request: SceneRequest;
   readonly device: GPUDevice;
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
-  readonly listeners: LiveListeners;
+  readonly listeners: DynamicListeners;
   readonly loops: () => boolean;
   /** Start position in seconds. */
   readonly startSeconds: number;
@@ -52,7 +52,7 @@ export class ClipPlayer implements Timeline {
     const ask = async <T>(own: Pick<ClipRequest, 'whole' | 'part'>, aborted: AbortSignal): Promise<T> => {
       const { url, credentials, limits } = request;
       const asked: ClipRequest = { isClip: true, url, credentials, limits, ...own };
-      const here = ({ openBoxes }: Here): Promise<ClipAnswer<T>> =>
+      const here = ({ openBoxes }: SceneWorker): Promise<ClipAnswer<T>> =>
         openBoxes(asked, aborted, () => undefined) as Promise<ClipAnswer<T>>;
       return (await loader.ask({ type: 'boxes', request: asked }, aborted, here)).clip;
     };
@@ -113,7 +113,7 @@ export class ClipPlayer implements Timeline {
   }
 
   /** Shows the frame at a time, if it is loaded; fetches the following ones. */
-  request({ timeSeconds }: Pick<LiveState, 'timeSeconds'>): void {
+  request({ timeSeconds }: Pick<DynamicState, 'timeSeconds'>): void {
     const frame = frameAt(this.#index, timeSeconds);
     const group = clipGroupAt(this.#index, frame);
     this.#cache.want(group, this.#options.loops());

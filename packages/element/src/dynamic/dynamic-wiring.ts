@@ -4,13 +4,13 @@ import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { StageHost } from '../stage-host.js';
-import type { LiveListeners, LiveState } from './live-model.js';
-import type { Painter } from '../gpu/painter.js';
+import type { ElementHost } from '../element-host.js';
+import type { DynamicListeners, DynamicState } from './dynamic-model.js';
+import type { Backend } from '../gpu/backend.js';
 import type { PostHost } from './post-controller.js';
 
 /** Interface of the element for its models. */
-export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
+export interface DynamicHost extends Pick<ElementHost, 'attributes' | 'services' | 'dynamicValues'> {
   readonly playback: PlaybackController;
   /** The sources that are drawn. */
   readonly shown: readonly LoadedGaussians[];
@@ -20,19 +20,19 @@ export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'l
 }
 
 /** Connects the models of an element, a generator and a post-processor, with its state and events. */
-export class LiveWiring implements PostHost {
+export class DynamicWiring implements PostHost {
   readonly #post = new Lazy('the code that runs post-processors', async () => {
     const { PostController } = await import('./post-controller.js');
     return new PostController(this);
   });
   #postUrls: readonly string[] = [];
-  #painter: Painter | null = null;
-  readonly #host: LiveHost;
+  #backend: Backend | null = null;
+  readonly #host: DynamicHost;
   #lastFault = '';
   /** Previous number of inputs. */
   #inputs = 0;
 
-  constructor(host: LiveHost) {
+  constructor(host: DynamicHost) {
     this.#host = host;
   }
 
@@ -49,16 +49,16 @@ export class LiveWiring implements PostHost {
   }
 
   /** Call when drawing starts or stops. A destroyed backend closes its post-processor itself. */
-  attachPost(painter: Painter | null): void {
-    this.#painter = painter;
+  attachPost(backend: Backend | null): void {
+    this.#backend = backend;
     this.#open();
   }
 
   #open(): void {
-    if (this.#post.value) this.#post.value.open(this.#painter, this.#postUrls);
-    else if (this.hasPost && this.#painter)
+    if (this.#post.value) this.#post.value.open(this.#backend, this.#postUrls);
+    else if (this.hasPost && this.#backend)
       this.#post.get().then(
-        (post) => post.open(this.#painter, this.#postUrls),
+        (post) => post.open(this.#backend, this.#postUrls),
         (error: unknown) => this.#fail(error),
       );
   }
@@ -83,17 +83,17 @@ export class LiveWiring implements PostHost {
   }
 
   /** Reports a change of inputs, after the change is shown. */
-  tellInputs(inputs: { readonly length: number } = [0]): void {
+  notifyInputs(inputs: { readonly length: number } = [0]): void {
     if (inputs.length + this.#inputs > 0) queueMicrotask(() => this.#host.dispatch(new Event('inputs-change')));
     this.#inputs = inputs.length;
   }
 
   /** Current state of the models that the page sets. */
-  get state(): LiveState {
-    return { ...this.#host.liveValues, timeSeconds: this.#host.playback.currentTime };
+  get state(): DynamicState {
+    return { ...this.#host.dynamicValues, timeSeconds: this.#host.playback.currentTime };
   }
 
-  get listeners(): LiveListeners {
+  get listeners(): DynamicListeners {
     // The clock of a scene may change.
     const onShown = (timeSeconds: number): void => this.#host.playback.frameShown(timeSeconds);
     return {

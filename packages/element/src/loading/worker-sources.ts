@@ -7,7 +7,7 @@ import { BOOTSTRAP, type CodeAnswer, type CodeQuestion } from './worker-bootstra
  * modules. If a Content-Security-Policy excludes `blob:`, the second way is a file with all readers, which bundlers
  * that know this expression emit.
  */
-export const OWN_WORKERS: readonly (() => Worker)[] = [
+export const WORKER_SOURCES: readonly (() => Worker)[] = [
   spawnOfText,
   (): Worker => new Worker(new URL('./scene-worker.bundle.js', import.meta.url), { type: 'module' }),
 ];

@@ -1,18 +1,18 @@
 import { loadModule, type Camera } from '@gaussian-splat/core';
 import { Viewpoint, type FrameSettings, type PerFrameSettings } from '@gaussian-splat/renderer';
 import { QueueClock, type ProbeAnswer, type ProbePoint, type WorkTime } from '@gaussian-splat/renderer/tools';
-import type { Frame, FrameFilter } from '../live/frame-filter.js';
+import type { Frame, FrameFilter } from '../dynamic/frame-filter.js';
 import type {
   CanvasFrame,
-  Contents,
+  FrameSource,
   Drawable,
-  Painter,
-  PainterEvents,
-  Place,
+  Backend,
+  BackendEvents,
+  DeviceOwner,
   ReadCounts,
   Rendering,
   Surface,
-} from './painter.js';
+} from './backend.js';
 import type { Counted } from './contributions.js';
 import { why } from './request-device.js';
 
@@ -20,13 +20,13 @@ import { why } from './request-device.js';
  * Draws frames on one WebGPU device: a viewpoint, whose buffers match the frame size, and the optional filter before
  * the canvas.
  */
-export class Viewport implements Painter {
+export class WebGpuBackend implements Backend {
   readonly viewpoint: Viewpoint;
   readonly device: GPUDevice;
-  readonly place: Place;
+  readonly place: DeviceOwner;
   readonly #submissions: number;
-  readonly #contents: Contents;
-  readonly #events: PainterEvents;
+  readonly #contents: FrameSource;
+  readonly #events: BackendEvents;
   readonly #clock: QueueClock;
   #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
   #filter: FrameFilter | undefined;
@@ -36,7 +36,7 @@ export class Viewport implements Painter {
   #drawnSize = '';
   #layout = 0;
 
-  constructor({ place, device, submissions }: Drawable, contents: Contents, events: PainterEvents) {
+  constructor({ place, device, submissions }: Drawable, contents: FrameSource, events: BackendEvents) {
     this.place = place;
     this.device = device;
     this.#submissions = submissions;

@@ -8,7 +8,15 @@ import {
   drawn as whenDrawn,
   type OrderView,
 } from '@gaussian-splat/renderer/webgl';
-import type { CanvasFrame, Painter, PainterEvents, Place, ReadCounts, Rendering, Surface } from '../gpu/painter.js';
+import type {
+  CanvasFrame,
+  Backend,
+  BackendEvents,
+  DeviceOwner,
+  ReadCounts,
+  Rendering,
+  Surface,
+} from '../gpu/backend.js';
 import { DepthSorter, type SortedSplats } from './depth-sorter.js';
 import type { GlLoaded } from './gl-loaded.js';
 import { cannotShow } from './gl-session.js';
@@ -27,7 +35,7 @@ interface CopySurface extends Surface {
 }
 
 /** Draws one scene with WebGL, in orders that a worker finds. */
-export class GlPainter implements Painter {
+export class WebGlBackend implements Backend {
   readonly filter = undefined;
   readonly isPrepared = true;
   readonly scene: GlLoaded;
@@ -47,17 +55,17 @@ export class GlPainter implements Painter {
   #isOwed = false;
   /** The first frame is drawn. */
   readonly #shown: Promise<void>;
-  #tellShown: () => void = () => undefined;
+  #resolveShown: () => void = () => undefined;
   /** Time of a full frame as far as known, ms. */
   #wholeMs = 0;
   #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
   #isDestroyed = false;
 
-  constructor(scene: GlLoaded, events: PainterEvents) {
+  constructor(scene: GlLoaded, events: BackendEvents) {
     this.scene = scene;
-    let tellOrdered: () => void;
-    this.#ordered = new Promise((resolve) => (tellOrdered = resolve));
-    this.#shown = new Promise((resolve) => (this.#tellShown = resolve));
+    let resolveOrdered: () => void;
+    this.#ordered = new Promise((resolve) => (resolveOrdered = resolve));
+    this.#shown = new Promise((resolve) => (this.#resolveShown = resolve));
     const { positions, areas, spawn } = scene;
     this.#sorter = new DepthSorter({
       ...{ positions, areas, spawn },
@@ -66,13 +74,13 @@ export class GlPainter implements Painter {
         const isDue = this.#isOwed || this.#sorted !== undefined;
         this.#isOwed = false;
         this.#setOrder(sorted);
-        tellOrdered();
+        resolveOrdered();
         if (isDue) events.onIncomplete();
       },
     });
   }
 
-  get place(): Place {
+  get place(): DeviceOwner {
     return this.scene.place;
   }
 
@@ -100,7 +108,7 @@ export class GlPainter implements Painter {
 
   prepare(): void {}
 
-  setFilter(filter: Parameters<Painter['setFilter']>[0]): void {
+  setFilter(filter: Parameters<Backend['setFilter']>[0]): void {
     if (filter === undefined) return;
     filter.close();
     throw cannotShow('a post-processor');
@@ -164,7 +172,7 @@ export class GlPainter implements Painter {
   destroy(): void {
     if (this.#isDestroyed) return;
     this.#isDestroyed = true;
-    this.#tellShown();
+    this.#resolveShown();
     this.#sorter.destroy();
   }
 
@@ -224,6 +232,6 @@ export class GlPainter implements Painter {
     // WebGL counts rows from the bottom, so a smaller image lies there.
     context.globalCompositeOperation = 'copy';
     context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
-    this.#tellShown();
+    this.#resolveShown();
   }
 }

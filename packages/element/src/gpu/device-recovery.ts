@@ -35,7 +35,7 @@ const LEAST_MS = 2_000;
  * after crashes do so for some minutes.
  * @returns A lease of it; undefined once the wait is aborted.
  */
-export async function deviceBack(device: SharedDevice, signal: AbortSignal): Promise<DeviceLease | undefined> {
+export async function waitForDevice(device: SharedDevice, signal: AbortSignal): Promise<DeviceLease | undefined> {
   for (let pause = FIRST_MS; ; pause = Math.min(LONGEST_MS, 2 * pause)) {
     await delay(LEAST_MS);
     await untilShown(pause - LEAST_MS, signal);

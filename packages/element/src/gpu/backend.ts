@@ -10,7 +10,7 @@ import type {
   World,
 } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer/tools';
-import type { Frame, FrameFilter } from '../live/frame-filter.js';
+import type { Frame, FrameFilter } from '../dynamic/frame-filter.js';
 
 /** Settings of frames. */
 export interface Rendering {
@@ -35,7 +35,7 @@ export interface ReadCounts {
 }
 
 /** Owner of a device, on which frames are drawn. */
-export interface Place {
+export interface DeviceOwner {
   /** The GPU context: owners with the same one share a backend. */
   readonly context: GPUDevice | WebGL2RenderingContext;
   readonly limits: { readonly maxTextureDimension2D: number };
@@ -47,17 +47,17 @@ export interface Place {
 
 /** A scene that can be drawn, with its device and backend. */
 export interface Drawable {
-  readonly place: Place;
+  readonly place: DeviceOwner;
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
   /** Number of submissions of a frame. */
   readonly submissions: number;
   /** Creates a backend for its device. */
-  openPainter(contents: Contents, events: PainterEvents): Painter;
+  openBackend(contents: FrameSource, events: BackendEvents): Backend;
 }
 
 /** Current content of frames. */
-export interface Contents {
+export interface FrameSource {
   readonly world: World;
   /** LOD settings, also at rest. */
   readonly levels: LodSettings;
@@ -71,7 +71,7 @@ export interface Contents {
 }
 
 /** Events of a backend. */
-export interface PainterEvents {
+export interface BackendEvents {
   /** The last frame was incomplete; the next one will not be. */
   readonly onIncomplete: () => void;
   /** A later frame than the first needs more memory than available: `out-of-memory/allocation`. */
@@ -98,8 +98,8 @@ export interface CanvasFrame {
 }
 
 /** Draws frames on canvases: `WebGpuBackend` or `WebGlBackend`. */
-export interface Painter {
-  readonly place: Place;
+export interface Backend {
+  readonly place: DeviceOwner;
   /** @throws GaussianSplatError `unsupported/webgl` without WebGPU. */
   readonly device: GPUDevice;
   /** Bytes of GPU memory for drawing, without the splats. */

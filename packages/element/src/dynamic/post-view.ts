@@ -1,16 +1,16 @@
-/** Loaded only for post-processors: see open-live-model.ts. */
+/** Loaded only for post-processors: see open-dynamic-model.ts. */
 import { PostProcessor, setRuntimeLocation, type GpuTensor } from '@gaussian-splat/generator';
 import { FilteredFrame } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from './frame-filter.js';
 import { inputsOf, type GeneratorInput } from './inputs.js';
-import type { LiveRequest } from './live-model.js';
-import { LivePictures } from './live-pictures.js';
+import type { DynamicRequest } from './dynamic-model.js';
+import { InputImages } from './input-images.js';
 import { compareOf, offerPanel } from './of-element.js';
 import { readsHeaders } from './model-files.js';
 import { StateReader } from './read-state.js';
 
 export interface PostRequest extends Pick<
-  LiveRequest,
+  DynamicRequest,
   'credentials' | 'element' | 'runtimeLocation' | 'loader' | 'limits' | 'state'
 > {
   /** One post-processor, or a chain of several. */
@@ -44,7 +44,7 @@ export class PostView implements FrameFilter {
   readonly #request: PostRequest;
   readonly #post: PostProcessor;
   readonly #reader: StateReader;
-  readonly #pictures: LivePictures;
+  readonly #pictures: InputImages;
   #surface: FilteredFrame | undefined;
   #tensor: GpuTensor | undefined;
   #depth: GpuTensor | undefined;
@@ -74,7 +74,7 @@ export class PostView implements FrameFilter {
     const given = new Set([input.name]);
     const whenIdle = (): Promise<void> => post.idle;
     const options = { credentials, signal, onChange, onError, whenIdle };
-    this.#pictures = new LivePictures(device, models.slice(0, 1), given, options);
+    this.#pictures = new InputImages(device, models.slice(0, 1), given, options);
   }
 
   /** Fetches and checks it. Rejects with GaussianSplatError, or the signal's reason. */

@@ -1,4 +1,4 @@
-import type { Painter } from '../gpu/painter.js';
+import type { Backend } from '../gpu/backend.js';
 import { LatestTask } from '../latest-task.js';
 import { PostView, type PostRequest } from './post-view.js';
 
@@ -7,7 +7,7 @@ export interface PostHost {
   readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
   requestFrame(): void;
   /** Called when there is another filter, or none. */
-  tellInputs(): void;
+  notifyInputs(): void;
 }
 
 /**
@@ -26,20 +26,20 @@ export class PostController {
    * @param painter null while nothing is drawn.
    * @param urls In execution order; none for unprocessed frames.
    */
-  open(painter: Painter | null, urls: readonly string[]): void {
+  open(backend: Backend | null, urls: readonly string[]): void {
     this.#opening.renew();
-    if (painter === null) return;
-    if (painter.filter) {
+    if (backend === null) return;
+    if (backend.filter) {
       this.#host.requestFrame();
-      this.#host.tellInputs();
+      this.#host.notifyInputs();
     }
-    painter.setFilter(undefined);
+    backend.setFilter(undefined);
     if (urls.length === 0) return;
     const options = this.#host.postRequest;
-    this.#opening.run((signal) => this.#load(painter, { ...options, urls, signal }), options.onError);
+    this.#opening.run((signal) => this.#load(backend, { ...options, urls, signal }), options.onError);
   }
 
-  async #load(painter: Painter, request: Omit<PostRequest, 'onChange'>): Promise<void> {
+  async #load(backend: Backend, request: Omit<PostRequest, 'onChange'>): Promise<void> {
     const { signal, onError } = request;
     const view = await PostView.open(
       {
@@ -47,11 +47,11 @@ export class PostController {
         onError: (error) => (signal.aborted ? undefined : onError(error)),
         onChange: () => this.#host.requestFrame(),
       },
-      painter.device,
+      backend.device,
     );
-    if (signal.aborted || painter.isDestroyed) return view.close();
-    painter.setFilter(view);
-    this.#host.tellInputs();
+    if (signal.aborted || backend.isDestroyed) return view.close();
+    backend.setFilter(view);
+    this.#host.notifyInputs();
     this.#host.requestFrame();
   }
 }

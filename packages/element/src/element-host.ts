@@ -1,7 +1,7 @@
 import type { Attributes } from './attributes.js';
 import type { SpokenStrings } from './words.js';
 import type { SharedDevice } from './gpu/shared-device.js';
-import type { LiveState } from './live/live-model.js';
+import type { DynamicState } from './dynamic/dynamic-model.js';
 import type { SceneLimits } from './loading/protocol.js';
 import type { SceneLoader } from './loading/scene-loader.js';
 
@@ -30,12 +30,12 @@ export interface Source {
 }
 
 /** The current attributes of the element, and the parts of its shadow tree once rendered. */
-export interface StageHost {
+export interface ElementHost {
   readonly attributes: Attributes;
   readonly services: Services;
   readonly source: Source & { readonly splatShader?: unknown };
   readonly strings: SpokenStrings;
-  readonly liveValues: Omit<LiveState, 'timeSeconds'>;
+  readonly dynamicValues: Omit<DynamicState, 'timeSeconds'>;
   part<T extends HTMLElement>(selector: string): T | null;
   warn(sentence: string): void;
 }

@@ -1,9 +1,0 @@
-import { spawnAt } from './spawn-worker.js';
-
-/**
- * Replaces own-worker.ts in the CDN build: the worker's script is in the folder of the element's, and loads its readers
- * from there.
- */
-export const OWN_WORKERS: readonly (() => Worker)[] = [
-  (): Worker => spawnAt(new URL('./scene-worker.js', import.meta.url)),
-];
