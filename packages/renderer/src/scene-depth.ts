@@ -45,6 +45,14 @@ export interface SceneDepthOptions {
   readonly out?: GPUTexture | undefined;
 }
 
+interface Size {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** Pixels of the last frame whose depth is in a texture, whichever object wrote it. */
+const drawnSizes = new WeakMap<GPUTexture, Size>();
+
 const FORMATS = /^(depth(32float|24plus|16unorm)(-stencil8)?|r32float)$/;
 
 /**
@@ -69,7 +77,6 @@ export class SceneDepth implements PaintingDepth {
   readonly #tiles = new BoundImages();
   readonly #layerViews: Readonly<Record<'layer_color' | 'second_depth' | 'second_color', GPUTextureView>>;
   #layerBindings: GPUBindGroup | undefined;
-  #drawn = { width: 0, height: 0 };
   #quads: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
 
   /** @throws GaussianSplatError `argument/value` for a texture that cannot be read or written. */
@@ -103,16 +110,24 @@ export class SceneDepth implements PaintingDepth {
   ): void {
     const host = this.#host;
     if (auxiliary) throw wrong('FrameTarget.depth', 'no depth in a frame with auxiliary outputs', 'both');
-    if (this.#outTexture) requireRoom(this.#outTexture, width, height, rasterizer);
-    this.#drawn = { width, height };
+    const out = this.#outTexture;
+    if (out) {
+      requireRoom(out, width, height, rasterizer);
+      drawnSizes.set(out, { width, height });
+    }
     const scale = host ? [host.texture.width / width, host.texture.height / height] : [1, 1];
     writeStruct(layouts.SceneDepth, { ...readingOf(host, camera), scale }, this.#bytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#bytes);
   }
 
   /** Pixels of the last frame: its settings, or the device's limits, may make it smaller than its target. */
-  get drawn(): { readonly width: number; readonly height: number } {
-    return this.#drawn;
+  get drawn(): Size {
+    return (this.#outTexture && drawnSizes.get(this.#outTexture)) ?? { width: 0, height: 0 };
+  }
+
+  /** Texture that receives the median depth. */
+  get out(): GPUTexture | undefined {
+    return this.#outTexture;
   }
 
   get overrides(): Overrides {

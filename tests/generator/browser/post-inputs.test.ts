@@ -1,6 +1,8 @@
 /** Post-processors that see more than the frame: its depth, its camera, and what they made of the frame before. */
 import '@gaussian-splat/element';
+import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';
+import type { SplatMeshElement } from '@gaussian-splat/element/scenes.js';
 import {
   assert,
   assertEqual,
@@ -10,6 +12,7 @@ import {
   showLoaded,
   until,
 } from '../../element/browser/support/harness.js';
+import { boxGlb } from '../../element/browser/support/glb.js';
 import { screenOf, type Rgb } from '../../element/browser/support/screen.js';
 import { calls, FIXTURES, RUNTIME } from './support.js';
 
@@ -59,6 +62,14 @@ describe('a post-processor in the element', () => {
     element.setAttribute('camera-orbit', '0deg 90deg 5m');
     element.jumpCameraToGoal();
     await untilPixel(element, [152, undefined, 127]);
+    // A mesh beside the ball brings a depth of its own, which hides splats and does not replace theirs.
+    const box = document.createElement('splat-mesh') as SplatMeshElement;
+    Object.assign(box, { src: boxGlb({ half: [0.1, 0.1, 0.1] }), position: [0, 1.6, 0] });
+    element.append(box);
+    await until(() => box.loaded, `the mesh, with ${box.error?.message ?? ''}`);
+    element.setAttribute('camera-orbit', '0deg 90deg 6m');
+    element.jumpCameraToGoal();
+    await untilPixel(element, [178, plain[1], 153]);
     element.remove();
   });
 

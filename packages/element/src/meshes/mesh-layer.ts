@@ -110,7 +110,7 @@ export class MeshLayer {
     }
   }
 
-  draw({ camera }: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<FrameTarget> {
+  draw({ camera, depth }: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<FrameTarget> {
     this.#arrange(models, world);
     this.#look(camera, world);
     const { width, height } = camera;
@@ -121,7 +121,7 @@ export class MeshLayer {
     const opaque = this.#drawKind(OPAQUE, this.#target);
     const hasGlass = models.some(({ model }) => (model as Model).materials.some(({ transparent }) => transparent));
     const glass = hasGlass ? this.#drawKind(TRANSPARENT, this.#glass) : undefined;
-    return { depth: this.#depthFor(opaque, glass) };
+    return { depth: this.#depthFor(opaque, glass, depth?.out) };
   }
 
   /** Draws the triangles of a kind. Transparent ones come second, and are hidden by opaque ones. */
@@ -178,12 +178,15 @@ export class MeshLayer {
     void this.#renderer.dispose();
   }
 
-  /** Bound once for the same textures. */
-  #depthFor(opaque: Drawn, second: Drawn | undefined): SceneDepth {
-    const key = [opaque.color, opaque.texture, second?.color, second?.texture];
+  /** Bound once for the same textures. @param out receives the depth of the splats */
+  #depthFor(opaque: Drawn, second: Drawn | undefined, out: GPUTexture | undefined): SceneDepth {
+    const key = [opaque.color, opaque.texture, second?.color, second?.texture, out];
     if (!this.#depth?.key.every((value, i) => value === key[i])) {
       this.#depth?.ofSplats.destroy();
-      const ofSplats = new SceneDepth(this.device, { host: { ...opaque, second, reversed: true, far: Infinity } });
+      const ofSplats = new SceneDepth(this.device, {
+        host: { ...opaque, second, reversed: true, far: Infinity },
+        out,
+      });
       this.#depth = { key, ofSplats };
     }
     return this.#depth.ofSplats;
