@@ -221,7 +221,7 @@ test('a clip that is read as a scene, and a .4dgs container, are refused with wh
   container[0] = 0x89;
   const files = [
     [clip.bytes, /a clip of many frames.*\.gsv/s],
-    [new Uint8Array([...container, ...new Uint8Array(64)]), /\.4dgs container.*gaussian-splat sequence/s],
+    [new Uint8Array([...container, ...new Uint8Array(64)]), /a \.4dgs file.*path ends with \.4dgs/s],
   ] as const;
   for (const [bytes, expected] of files)
     await assert.rejects(readScene(bytes, { name: 'a file' }), (error: { code: string; message: string }) => {

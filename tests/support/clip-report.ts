@@ -1,12 +1,22 @@
 /**
- * `npm run lab:clip -- [--splats N] [--frames N] [--per-file N] [--min-db DB] [--out FILE]`: what a clip costs whose splats come and go: a made, seeded fountain of 150,000
- * splats at 30 frames a second. Says the rate, the bytes before the first frame, and how long each of them takes at 2 and 8 Mbit/s.
+ * `npm run lab:clip -- [options]`: what a clip costs whose splats come and go: a made, seeded fountain of 150,000 splats at 30 frames a second. Prints one table of measures,
+ * aims and what was seen: the rate, the bytes before the first frame, and how long each of them takes at 2 and 8 Mbit/s.
+ *
+ * --splats N    splats at any time (default 150000)
+ * --frames N    frames (default 300)
+ * --per-file N  frames of a group (default 45)
+ * --min-db DB   PSNR of the worst held-out view (default 45)
+ * --jobs N      processes that share the groups (default: a quarter of the processors); each finds its own rounding
+ * --out FILE    where the clip is written (default: nowhere)
  */
-import { writeFileSync } from 'node:fs';
-import { resolve } from 'node:path';
+import { fork } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { availableParallelism, tmpdir } from 'node:os';
+import { join, resolve } from 'node:path';
+import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
-import { codeClip } from '@gaussian-splat/economise';
-import { CLIP_HEAD_BYTES, clipIndexBytes, parseClip, type ClipIndex } from '@gaussian-splat/formats';
+import { codeClip, type CodedClip } from '@gaussian-splat/economise';
+import { CLIP_HEAD_BYTES, clipIndexBytes, parseClip, writeClipHead, type ClipIndex } from '@gaussian-splat/formats';
 import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import { deflate, deflateQuickly, encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
@@ -16,50 +26,114 @@ const FRAMES_PER_SECOND = 30;
 const text = (fallback: string) => ({ type: 'string', default: fallback }) as const;
 const { values } = parseArgs({
   options: {
-    ...{ splats: text('150000'), frames: text('300'), 'per-file': text('90'), 'min-db': text('45') },
+    ...{ splats: text('150000'), frames: text('300'), 'per-file': text('45'), 'min-db': text('45') },
+    jobs: text(String(Math.max(1, Math.floor(availableParallelism() / 4)))),
     out: { type: 'string' },
+    // Frames of a process that another one started.
+    ...{ from: { type: 'string' }, until: { type: 'string' } },
   },
 });
 const [splats, frames, framesPerGroup] = [values.splats, values.frames, values['per-file']].map(Number);
 
-const adapter = await requestNodeAdapter({ isTrusted: true });
-const device = await adapter.requestDevice(deviceDescriptor(adapter));
-await startVariants(device, { format: 'rgba8unorm' });
-const frameOf = fountain({ splats, frames, framesPerSecond: FRAMES_PER_SECOND });
-const begin = performance.now();
-const { user } = process.cpuUsage();
-const seconds = (since: number): string => ((performance.now() - since) / 1000).toFixed(0);
-const clip = await codeClip({
-  ...{ frameCount: frames, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup, minDecibels: Number(values['min-db']) },
-  openFrame: (frame) => Promise.resolve(frameOf(frame)),
-  ...{ device, encodeWebp, deflate, deflateQuickly },
-  onStep: (step) => console.log(`${seconds(begin)} s: ${step}`),
-});
-const cpu = (process.cpuUsage().user - user) / 1e6;
-if (values.out) writeFileSync(resolve(process.env.INIT_CWD ?? process.cwd(), values.out), clip.bytes);
+/** What a process says of the frames that it coded. */
+interface Facts extends Omit<CodedClip, 'bytes'> {
+  readonly cpuSeconds: number;
+}
 
-const index = parseClip(clip.bytes, 'a clip');
-const rate = (8e-6 * clip.bytes.length) / index.durationSeconds;
-console.log(
-  `${splats} splats at any time, ${frames} frames in groups of ${framesPerGroup}: ${cpu.toFixed(0)} s of CPU`,
-);
-console.log(`${clip.splats} splats in all groups, ${clip.passing} of them in some frames only`);
-console.log(`${clip.decibels.toFixed(2)} dB in held-out views, ${clip.worstDecibels.toFixed(2)} dB in the worst`);
-console.log(
-  `${clip.bytes.length} bytes: ${rate.toFixed(2)} Mbit/s; scenes ${share('sceneBytes')}, motion ${share('motionBytes')}`,
-);
-const first = CLIP_HEAD_BYTES + clipIndexBytes(clip.bytes, 'a clip');
-const { sceneBytes, motionBytes } = index.groups[0].parts[0];
-console.log(
-  `the first frame needs ${clip.firstBytes} bytes (index ${first}, scene ${sceneBytes}, motion ${motionBytes}): ` +
-    `${secondsAt(2, clip.firstBytes).toFixed(2)} s at 2 Mbit/s, ${secondsAt(8, clip.firstBytes).toFixed(2)} s at 8`,
-);
-console.log(`at 8 Mbit/s, played from the first frame on, it waits ${waitsAt(8, index).toFixed(2)} s in all`);
-device.destroy();
+if (values.from === undefined) await report();
+else await codeFrames(Number(values.from), Number(values.until), values.out!);
 
-function share(of: 'sceneBytes' | 'motionBytes'): string {
-  const bytes = index.groups.reduce((sum, { parts }) => sum + parts.reduce((own, part) => own + part[of], 0), 0);
-  return `${((8e-6 * bytes) / index.durationSeconds).toFixed(2)} Mbit/s`;
+async function codeFrames(from: number, until: number, out: string): Promise<void> {
+  const adapter = await requestNodeAdapter({ isTrusted: true });
+  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  await startVariants(device, { format: 'rgba8unorm' });
+  const frameOf = fountain({ splats, frames, framesPerSecond: FRAMES_PER_SECOND });
+  const begin = performance.now();
+  const { bytes, ...facts } = await codeClip({
+    ...{ frameCount: until - from, framesPerSecond: FRAMES_PER_SECOND, framesPerGroup },
+    minDecibels: Number(values['min-db']),
+    openFrame: (frame) => Promise.resolve(frameOf(from + frame)),
+    ...{ device, encodeWebp, deflate, deflateQuickly },
+    onStep: (step) => console.error(`${((performance.now() - begin) / 1000).toFixed(0)} s, from ${from} on: ${step}`),
+  });
+  writeFileSync(out, bytes);
+  const { user, system } = process.cpuUsage();
+  process.send!({ ...facts, cpuSeconds: 1e-6 * (user + system) } satisfies Facts);
+  device.destroy();
+  process.disconnect();
+}
+
+async function report(): Promise<void> {
+  const folder = mkdtempSync(join(tmpdir(), 'clip-'));
+  const begin = performance.now();
+  try {
+    const groups = Math.ceil(frames / framesPerGroup);
+    const jobs = Math.max(1, Math.min(groups, Number(values.jobs)));
+    const edge = (job: number): number => Math.min(frames, framesPerGroup * Math.round((groups * job) / jobs));
+    const files = Array.from({ length: jobs }, (_, job) => join(folder, `${job}.gsv`));
+    const facts = await Promise.all(files.map((file, job) => codedBy(edge(job), edge(job + 1), file)));
+    const bytes = joined(files.map((file) => readFileSync(file)));
+    if (values.out) writeFileSync(resolve(process.env.INIT_CWD ?? process.cwd(), values.out), bytes);
+    printTable(bytes, facts, (performance.now() - begin) / 1000);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+}
+
+function codedBy(from: number, until: number, file: string): Promise<Facts> {
+  const own = Object.entries({ ...values, jobs: '1', from: String(from), until: String(until), out: file });
+  const child = fork(
+    fileURLToPath(import.meta.url),
+    own.flatMap(([name, value]) => [`--${name}`, value]),
+  );
+  return new Promise((done, fail) => {
+    child.on('message', (facts: Facts) => done(facts));
+    child.on('error', fail);
+    child.on('exit', (code) => code && fail(new Error(`frames ${from} to ${until - 1}: failed with status ${code}`)));
+  });
+}
+
+/** Groups of several clips one behind the other. */
+function joined(files: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
+  const clips = files.map((file) => ({ file, index: parseClip(file, 'a clip') }));
+  const groups = clips.flatMap(({ index }) => index.groups);
+  const bodies = clips.map(({ file }) => file.subarray(CLIP_HEAD_BYTES + clipIndexBytes(file, 'a clip')));
+  return new Uint8Array(Buffer.concat([writeClipHead({ ...clips[0].index, groups }), ...bodies]));
+}
+
+function printTable(bytes: Uint8Array, facts: readonly Facts[], seconds: number): void {
+  const index = parseClip(bytes, 'a clip');
+  const sum = (of: (facts: Facts) => number): number => facts.reduce((total, own) => total + of(own), 0);
+  const rate = (length: number): string => `${((8e-6 * length) / index.durationSeconds).toFixed(2)} Mbit/s`;
+  const lengths = (of: 'sceneBytes' | 'motionBytes'): number =>
+    index.groups.reduce((total, { parts }) => total + parts.reduce((own, part) => own + part[of], 0), 0);
+  const head = CLIP_HEAD_BYTES + clipIndexBytes(bytes, 'a clip');
+  const { sceneBytes, motionBytes, splats: coarse } = index.groups[0].parts[0];
+  const first = head + sceneBytes + motionBytes;
+  const at = (megabits: number): string => `${secondsAt(megabits, first).toFixed(2)} s`;
+  const rows = [
+    ['measure', 'aim', 'seen'],
+    ['splats at any time, frames, groups', '', `${splats}, ${frames}, ${index.groups.length} of ${framesPerGroup}`],
+    ['splats of all groups, of some frames only', '', `${sum((own) => own.splats)}, ${sum((own) => own.passing)}`],
+    [
+      'worst held-out view',
+      `${values['min-db']} dB`,
+      `${Math.min(...facts.map((f) => f.worstDecibels)).toFixed(2)} dB`,
+    ],
+    ['rate', '8 Mbit/s', rate(bytes.length)],
+    ['  of scenes, of motion', '', `${rate(lengths('sceneBytes'))}, ${rate(lengths('motionBytes'))}`],
+    ['first frame at 2 Mbit/s', '1.7 s', at(2)],
+    ['  bytes: index, scene, motion', '', `${head}, ${sceneBytes}, ${motionBytes} (${coarse} splats)`],
+    ['first frame at 8 Mbit/s', '', at(8)],
+    ['waits at 8 Mbit/s, in all', '0 s', `${waitsAt(8, index).toFixed(2)} s`],
+    ['bytes', '', String(bytes.length)],
+    [
+      'processes, CPU, time',
+      '',
+      `${facts.length}, ${sum((own) => own.cpuSeconds).toFixed(0)} s, ${seconds.toFixed(0)} s`,
+    ],
+  ];
+  for (const row of rows) console.log(`| ${row.join(' | ')} |`);
 }
 
 function secondsAt(megabits: number, bytes: number): number {

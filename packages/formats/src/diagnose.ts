@@ -60,8 +60,8 @@ const SIGNED_KINDS: Readonly<Record<ForeignName, ForeignKind>> = {
   },
   fourDgs: {
     code: 'decode/unsupported',
-    found: 'a .4dgs container, which is not read',
-    remedy: 'export its frames as scene files, and make a clip of these with gaussian-splat sequence',
+    found: 'a .4dgs file, whose splats move',
+    remedy: 'show it as the src of <gaussian-splat>, by an address whose path ends with .4dgs',
   },
   zstandard: foreign('a Zstandard file'),
 };

@@ -47,12 +47,6 @@ export const UNREAD_KINDS: readonly UnreadKind[] = [
     fits: (bytes) => startsWith(bytes, 'spx') && bytes[3] > 0 && bytes[3] < 16,
   },
   {
-    found: 'a .4dgs sequence, whose splats move',
-    remedy: 'export each moment as a PLY or SPZ of its own, and show them as a sequence',
-    extensions: /^4dgs$/,
-    fits: (bytes) => startsWith(bytes, '\x894DGS'),
-  },
-  {
     found: 'a head of LAM, whose splats follow an animated mesh',
     remedy: 'export the splats of one pose as PLY, or a generator that holds the mesh',
     within: /(^|\/)offset\.ply$/i,

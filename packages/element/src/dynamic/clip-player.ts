@@ -59,12 +59,12 @@ export class ClipPlayer implements Timeline {
     const whole = await localFile(request.url);
     const opened = await ask<OpenedClip>({ whole }, signal);
     const { index } = opened;
-    const file = opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]);
+    const file = opened.file ?? (opened.isPartial ? whole : new Blob([await loader.fetchFile(request, signal)]));
     const cache = new GroupCache(index, {
       fetchPart: (group, part, aborted) => {
         const { frames, parts } = index.groups[group];
         return ask<PackedAnimation>(
-          { whole: file, part: { part: parts[part], frames, origin: index.origin } },
+          { whole: file, part: { part: parts[part], group, frames, origin: index.origin } },
           aborted,
         );
       },

@@ -171,7 +171,7 @@ async function openDynamicScene(request: SceneRequest, options: OpenOptions): Pr
  * unless it is to be loaded completely.
  */
 export function isStreamed({ url, isWhole }: SceneRequest): boolean {
-  const name = /(^|\/)(detail|lod-meta)\.json$|\.gsv$/i.exec(nameIn(url));
+  const name = /(^|\/)(detail|lod-meta)\.json$|\.(gsv|4dgs)$/i.exec(nameIn(url));
   return name !== null && !(isWhole && name[2] === 'lod-meta');
 }
 

@@ -126,7 +126,13 @@ export interface ClipRequest extends FileRequest {
   /** The whole file, if the page has it. */
   readonly whole?: Blob | undefined;
   /** Absent for the index. */
-  readonly part?: { readonly part: ClipPart; readonly frames: number; readonly origin: Vector3 };
+  readonly part?: {
+    readonly part: ClipPart;
+    /** Number of its group. */
+    readonly group: number;
+    readonly frames: number;
+    readonly origin: Vector3;
+  };
 }
 
 /** Result of a {@link ClipRequest}. */

@@ -1,0 +1,234 @@
+/** Chunks of a `.4dgs` file: which there are, by their heads alone, and the integers of each. */
+import type { LoadBudget } from '../budget.js';
+import { grouped } from '../bytes.js';
+import { damaged } from '../faults.js';
+import {
+  ATTRIBUTE,
+  readBand,
+  readStreams,
+  unpackedBlock,
+  wholeNumber,
+  type AttributeId,
+  type Bins,
+} from './streams.js';
+import { Cursor, OPCODE, type FileRecord, type TemporalModel } from './wire.js';
+
+/** What the head of a chunk says. */
+export interface Chunk {
+  readonly from: number;
+  readonly until: number;
+  readonly level: number;
+  /** Byte of the file at which its record begins. */
+  readonly offset: number;
+  readonly content: Uint8Array;
+  /** Records of spherical harmonics that follow it. */
+  readonly bands: Uint8Array[];
+  /** Splats that are there, after its changes. */
+  readonly live: number;
+  /** Splats that it says something of. */
+  readonly splats: number;
+  /** Splats that it is the first to have, since the keyframe. */
+  readonly births: number;
+  /** Number among the chunks of the one that it changes; undefined: it is whole. */
+  readonly reference?: number;
+}
+
+const DELTA_MODE = { keyframe: 0, chained: 1 } as const;
+
+/** Reads the heads of all chunks, and checks what the index says of them. */
+export function chunksOf(records: readonly FileRecord[], model: TemporalModel, name: string): Chunk[] {
+  const chunks: Chunk[] = [];
+  for (const { opcode, offset, content } of records) {
+    if (opcode === OPCODE.chunk) chunks.push(wholeChunk(content, offset, name));
+    else if (opcode === OPCODE.deltaChunk && model === 'keyframe-delta')
+      chunks.push(deltaChunk(content, offset, chunks, name));
+    else if (opcode === OPCODE.shBand && chunks.length > 0) chunks[chunks.length - 1].bands.push(content);
+    else if (opcode === OPCODE.chunkIndex) checkEntry(content, chunks, name);
+  }
+  if (model === 'keyframe-delta') requireTiles(chunks, name);
+  return chunks;
+}
+
+function wholeChunk(content: Uint8Array, offset: number, name: string): Chunk {
+  const cursor = new Cursor(content, name);
+  const [from, until, level, live] = [cursor.f64(), cursor.f64(), cursor.u32(), cursor.u32()];
+  return { ...span(from, until, name), level, offset, content, bands: [], live, splats: live, births: live };
+}
+
+function span(from: number, until: number, name: string): Pick<Chunk, 'from' | 'until'> {
+  if (from <= until && Math.abs(from) < 1e9 && Math.abs(until) < 1e9) return { from, until };
+  throw damaged(name, 'chunks that begin before they end', `${from} to ${until} s`, 'decode/header');
+}
+
+function deltaChunk(content: Uint8Array, offset: number, chunks: readonly Chunk[], name: string): Chunk {
+  const cursor = new Cursor(content, name);
+  const [from, until, level, mode] = [cursor.f64(), cursor.f64(), cursor.u32(), cursor.u8()];
+  const [referenceAt, keyframeAt, depth] = [cursor.u64(), cursor.u64(), cursor.u16()];
+  const [updates, births, deaths] = [cursor.u32(), cursor.u32(), cursor.u32()];
+  const reference = chunks.findIndex((chunk) => chunk.offset === referenceAt);
+  const chain = chainOf(chunks, reference);
+  const isPrevious = mode === DELTA_MODE.keyframe ? chain.length === 1 : reference === chunks.length - 1;
+  if (mode > DELTA_MODE.chained || !isPrevious || chunks[chain[0]].offset !== keyframeAt || chain.length !== depth)
+    throw damaged(name, 'changes of a chunk before, as deep as they say', `a reference to byte ${referenceAt}`);
+  const { live, level: other } = chunks[reference];
+  if (level !== other) throw damaged(name, `changes of level ${other}, as their reference`, `level ${level}`);
+  if (updates + deaths > live || live + births > 2 ** 32)
+    throw damaged(name, `changes of ${grouped(live)} splats`, grouped(updates + deaths), 'decode/header');
+  return {
+    ...{ ...span(from, until, name), level, offset, content, bands: [], reference, births },
+    ...{ live: live + births - deaths, splats: updates + births + deaths },
+  };
+}
+
+/** Chunks that make a state, from a whole one on. */
+export function chainOf(chunks: readonly Chunk[], last: number): number[] {
+  const chain: number[] = [];
+  for (let k: number | undefined = last; k !== undefined && k >= 0; k = chunks[k].reference) chain.unshift(k);
+  return chain;
+}
+
+/** States follow one another without a gap. */
+function requireTiles(chunks: readonly Chunk[], name: string): void {
+  let end = 0;
+  for (const { from, until } of chunks) {
+    if (from !== end) throw damaged(name, `a state from ${end} s on`, `one from ${from} s on`);
+    end = until;
+  }
+}
+
+function checkEntry(content: Uint8Array, chunks: readonly Chunk[], name: string): void {
+  const cursor = new Cursor(content, `${name}, index`);
+  cursor.numbers(2);
+  const offset = cursor.u64();
+  cursor.u64();
+  const [splats, bands] = [cursor.u32(), cursor.u32()];
+  const chunk = chunks.find((own) => own.offset === offset);
+  if (!chunk) throw damaged(cursor.name, 'places of chunks', `byte ${offset}`, 'decode/header');
+  cursor.take(17 * bands);
+  const isLong = cursor.left >= 28;
+  if (isLong) cursor.take(20);
+  const live = isLong ? cursor.u64() : chunk.live;
+  if (splats === chunk.splats && live === chunk.live) return;
+  const said = (a: number, b: number): string => `${grouped(a)} splats, ${grouped(b)} there`;
+  throw damaged(cursor.name, said(chunk.splats, chunk.live), said(splats, live), 'decode/header');
+}
+
+/** Integers of a state: attributes, and bytes of spherical harmonics. */
+export interface State {
+  readonly bins: Bins;
+  readonly bands: readonly Int32Array[];
+}
+
+export interface Decoding {
+  readonly name: string;
+  readonly budget: LoadBudget;
+  readonly shDegree: number;
+}
+
+/** @param chain see {@link chainOf} */
+export async function stateOf(chunks: readonly Chunk[], chain: readonly number[], decoding: Decoding): Promise<State> {
+  let state = await wholeState(chunks[chain[0]], decoding);
+  for (const k of chain.slice(1)) state = await changedState(state, chunks[k], decoding);
+  return state;
+}
+
+async function wholeState({ content, bands, live }: Chunk, decoding: Decoding): Promise<State> {
+  const cursor = new Cursor(content, decoding.name);
+  cursor.take(24);
+  const bins = await readStreams(
+    new Cursor(await unpackedBlock(cursor, decoding.budget), decoding.name),
+    live,
+    decoding,
+  );
+  return { bins, bands: await bandsOf(bands, live, decoding) };
+}
+
+async function bandsOf(records: readonly Uint8Array[], count: number, decoding: Decoding): Promise<Int32Array[]> {
+  const { name, shDegree } = decoding;
+  const found: Int32Array[] = [];
+  for (const record of records) {
+    const cursor = new Cursor(record, name);
+    const band = cursor.u8();
+    if (band < 1 || band > shDegree || found[band - 1])
+      throw damaged(name, `bands 1 to ${shDegree}, once each`, `band ${band}`, 'decode/header');
+    found[band - 1] = await readBand(cursor, count, band, decoding);
+  }
+  if (count === 0) return Array.from({ length: shDegree }, () => new Int32Array(0));
+  if (found.filter(Boolean).length === shDegree) return found;
+  throw damaged(name, `${shDegree} bands of spherical harmonics`, String(records.length), 'decode/header');
+}
+
+/** What a delta may not change: grids depend on it. */
+const FIXED: readonly AttributeId[] = [ATTRIBUTE.sigma, ATTRIBUTE.flags, ATTRIBUTE.window];
+/** What a delta gives anew; all else is added. */
+const REPLACED: readonly AttributeId[] = [ATTRIBUTE.rotationIndex, ATTRIBUTE.rotation];
+
+async function changedState(before: State, chunk: Chunk, decoding: Decoding): Promise<State> {
+  const { name, budget } = decoding;
+  const cursor = new Cursor(chunk.content, name);
+  cursor.take(16 + 4 + 1 + 8 + 8 + 2);
+  const counts = [cursor.u32(), cursor.u32(), cursor.u32()];
+  const groups = new Cursor(await unpackedBlock(cursor, budget), name);
+  const read = async (count: number): Promise<Bins> => readStreams(new Cursor(groups.block(), name), count, decoding);
+  const [updates, births, deaths] = [await read(counts[0]), await read(counts[1]), await read(counts[2])];
+  const wrong = FIXED.find((id) => updates.has(id));
+  if (wrong !== undefined) throw damaged(name, 'changes that leave grids alone', `attribute ${wrong}`, 'decode/header');
+  const rowOf = rowsById(before.bins, name);
+  const [changed, dead, born] = [idsOf(updates, counts[0]), idsOf(deaths, counts[2]), idsOf(births, counts[1])];
+  const touched = new Set([...changed, ...dead, ...born]);
+  const isKnown = (id: number): boolean => rowOf.has(id);
+  if (touched.size !== counts[0] + counts[1] + counts[2] || ![...changed, ...dead].every(isKnown) || born.some(isKnown))
+    throw damaged(name, 'splats that change or go once each, and are there', 'others');
+  const gone = new Set(dead);
+  const kept = [...rowOf].filter(([id]) => !gone.has(id)).map(([, row]) => row);
+  const place = new Map(kept.map((row, k) => [row, k]));
+  const bins = new Map<AttributeId, Int32Array>();
+  for (const [id, values] of before.bins) {
+    const channels = values.length / rowOf.size;
+    const own = joined(values, kept, channels, births.get(id), counts[1], budget, name);
+    const change = id === ATTRIBUTE.id ? undefined : updates.get(id);
+    if (change)
+      changed.forEach((changedId, i) => {
+        const row = place.get(rowOf.get(changedId)!)!;
+        for (let c = 0; c < channels; c++) {
+          const value = change[channels * i + c];
+          own[channels * row + c] = REPLACED.includes(id) ? value : wholeNumber(own[channels * row + c] + value, name);
+        }
+      });
+    bins.set(id, own);
+  }
+  const bornBands = await bandsOf(chunk.bands, counts[1], decoding);
+  const bands = before.bands.map((values, k) =>
+    joined(values, kept, 3 * (2 * k + 3), bornBands[k], counts[1], budget, name),
+  );
+  return { bins, bands };
+}
+
+/** Rows that stay, and those that come. */
+function joined(
+  values: Int32Array,
+  kept: readonly number[],
+  channels: number,
+  added: Int32Array | undefined,
+  births: number,
+  budget: LoadBudget,
+  name: string,
+): Int32Array {
+  if (births > 0 && !added) throw damaged(name, 'all attributes of splats that come', 'some', 'decode/header');
+  budget.take(4 * channels * (kept.length + births), name);
+  const own = new Int32Array(channels * (kept.length + births));
+  kept.forEach((row, k) => own.set(values.subarray(channels * row, channels * (row + 1)), channels * k));
+  if (added) own.set(added, channels * kept.length);
+  return own;
+}
+
+const idsOf = (bins: Bins, count: number): number[] => Array.from(bins.get(ATTRIBUTE.id) ?? new Int32Array(count));
+
+/** Rows by the numbers of their splats. */
+export function rowsById(bins: Bins, name: string): Map<number, number> {
+  const ids = bins.get(ATTRIBUTE.id);
+  if (!ids) throw damaged(name, 'numbers of splats', 'none', 'decode/header');
+  const rows = new Map(Array.from(ids, (id, row) => [id, row]));
+  if (rows.size === ids.length) return rows;
+  throw damaged(name, 'splats of different numbers', 'a number twice');
+}

@@ -1,0 +1,200 @@
+/** Reads `.4dgs` files, whose splats come, move and fade: https://github.com/avala-ai/4dgs. */
+import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { LoadBudget, type LoadLimits } from '../budget.js';
+import { damaged } from '../faults.js';
+import { ATTRIBUTE, type AttributeId } from './streams.js';
+import { chainOf, chunksOf, rowsById, stateOf, type Chunk, type State } from './chunks.js';
+import { presence, splatsFrom, type ChangingSplats, type Scene } from './splats.js';
+import { poseAt, product, readTrack, turnedPoint, type ObjectTrack } from './tracks.js';
+import { Cursor, OPCODE, readGrids, readHeader, readUp, readWindows, recordsOf } from './wire.js';
+
+/** Grids farther out than this have an origin of their own, so that places keep their precision. */
+const FAR = 1000;
+/** States that are kept, since frames that follow one another need the same. */
+const MOST_STATES = 4;
+
+/** Splats of a moment or a span of time, and the numbers that tell them apart. */
+export interface Population {
+  readonly splats: ChangingSplats;
+  /** Absent where splats of other moments are others. */
+  readonly ids?: Int32Array | undefined;
+}
+
+/** An opened file: its chunks are decoded when they are asked for. */
+export class FourDgs {
+  readonly scene: Scene;
+  readonly chunks: readonly Chunk[];
+  readonly tracks: ReadonlyMap<number, ObjectTrack>;
+  readonly up: Vector3 | undefined;
+  readonly origin: Vector3;
+  readonly byteLength: number;
+  readonly #limits: LoadLimits;
+  readonly #states = new Map<string, Promise<Population>>();
+
+  /**
+   * Reads what a file says of itself, and the heads of its chunks.
+   * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`, `out-of-memory/budget`
+   */
+  constructor(bytes: Uint8Array, name: string, limits: LoadLimits = {}) {
+    const records = recordsOf(bytes, name);
+    const find = (opcode: number): Cursor | undefined => {
+      const record = records.find((own) => own.opcode === opcode);
+      return record && new Cursor(record.content, name);
+    };
+    const header = readHeader(find(OPCODE.header)!);
+    const grids = find(OPCODE.quantization);
+    if (!grids) throw damaged(name, 'a record of quantization', 'none', 'decode/header');
+    const windows = find(OPCODE.windows);
+    this.scene = { header, grids: readGrids(grids), windows: windows ? readWindows(windows) : [], name };
+    this.chunks = chunksOf(records, header.model, name);
+    new LoadBudget(bytes.length, limits).takeSplats(header.splats, header.shDegree, name);
+    this.tracks = tracksOf(
+      records.filter(({ opcode }) => opcode === OPCODE.objectTrack),
+      name,
+    );
+    const frame = find(OPCODE.frame);
+    this.up = frame && readUp(frame);
+    const { origin } = this.scene.grids;
+    this.origin = Math.hypot(...origin) > FAR ? origin : [0, 0, 0];
+    this.byteLength = bytes.length;
+    this.#limits = limits;
+  }
+
+  get isKeyed(): boolean {
+    return this.scene.header.model === 'keyframe-delta';
+  }
+
+  /** Number of the chunk that is the state of a time. */
+  stateAt(seconds: number): number {
+    const next = this.chunks.findIndex(({ until }) => seconds < until);
+    return next < 0 ? this.chunks.length - 1 : next;
+  }
+
+  /** Chunks whose splats may be seen in a span of time. */
+  chunksWithin(from: number, until: number): number[] {
+    return [...this.chunks.keys()].filter((k) => this.chunks[k].from <= until && from < this.chunks[k].until);
+  }
+
+  /** Splats of some chunks, none of which needs others. */
+  population(chunks: readonly number[]): Promise<Population> {
+    return this.#kept(`${chunks}`, async (decoding) => {
+      const states = await Promise.all(chunks.map((k) => stateOf(this.chunks, [k], decoding)));
+      return { splats: splatsFrom(...parts(mergedStates(states, decoding.shDegree)), this.scene) };
+    });
+  }
+
+  /** Splats of a state, after all changes that lead to it. */
+  keyedPopulation(chunk: number): Promise<Population> {
+    return this.#kept(`to ${chunk}`, async (decoding) => {
+      const state = await stateOf(this.chunks, chainOf(this.chunks, chunk), decoding);
+      const { name } = this.scene;
+      const ids = Int32Array.from(rowsById(state.bins, name).keys());
+      return { splats: splatsFrom(...parts(state), this.scene), ids };
+    });
+  }
+
+  /**
+   * Splats at a time, as section 3 of the specification has them.
+   * @throws GaussianSplatError as the constructor does
+   */
+  async cloudAt(seconds: number): Promise<GaussianCloud> {
+    const within = this.chunksWithin(seconds, seconds);
+    const { splats } = await (this.isKeyed ? this.keyedPopulation(this.stateAt(seconds)) : this.population(within));
+    const { cutoff } = this.scene.header;
+    const rows = [...Array(splats.count).keys()].filter((i) => presence(splats, i, seconds, cutoff) > 0);
+    return this.cloudOf(splats, rows, seconds);
+  }
+
+  /** Rows of some splats at a time, whether they are seen or not. */
+  cloudOf(splats: ChangingSplats, rows: readonly number[], seconds: number): GaussianCloud {
+    const { shDegree, cutoff } = this.scene.header;
+    const pick = (values: Float32Array, width: number): Float32Array => {
+      const own = new Float32Array(width * rows.length);
+      rows.forEach((row, k) => own.set(values.subarray(width * row, width * (row + 1)), width * k));
+      return own;
+    };
+    const positions = new Float32Array(3 * rows.length);
+    const rotations = pick(splats.rotations, 4);
+    rows.forEach((row, k) => this.#place(splats, row, seconds, positions.subarray(3 * k), rotations.subarray(4 * k)));
+    return {
+      ...{
+        count: rows.length,
+        shDegree,
+        origin: this.origin,
+        positions,
+        rotations,
+        antialiased: false,
+        droppedCount: 0,
+      },
+      scales: pick(splats.scales, 3),
+      opacities: Float32Array.from(rows, (row) => splats.opacities[row] * presence(splats, row, seconds, cutoff)),
+      sh: pick(splats.sh, splats.count > 0 ? splats.sh.length / splats.count : 3),
+      ...(this.up && { hints: { up: this.up } }),
+    };
+  }
+
+  /** Motion of the splat itself first, then that of its object. */
+  #place(splats: ChangingSplats, row: number, seconds: number, position: Float32Array, rotation: Float32Array): void {
+    const { grids } = this.scene;
+    const elapsed = seconds - splats.centers[row];
+    const point = [0, 1, 2].map(
+      (k) => splats.positions[3 * row + k] + grids.origin[k] + splats.velocities[3 * row + k] * elapsed,
+    );
+    const track = this.tracks.get(splats.objects[row]);
+    const pose = track && poseAt(track, seconds);
+    const placed = pose ? turnedPoint(pose.rotation, point).map((value, k) => value + pose.translation[k]) : point;
+    for (let k = 0; k < 3; k++) position[k] = placed[k] - this.origin[k];
+    if (pose) rotation.set(product(pose.rotation, Array.from(rotation.subarray(0, 4))));
+  }
+
+  #kept(
+    key: string,
+    decode: (decoding: { name: string; budget: LoadBudget; shDegree: number }) => Promise<Population>,
+  ): Promise<Population> {
+    const { name, header } = this.scene;
+    const found = this.#states.get(key);
+    this.#states.delete(key);
+    const asked =
+      found ?? decode({ name, budget: new LoadBudget(this.byteLength, this.#limits), shDegree: header.shDegree });
+    this.#states.set(key, asked);
+    for (const [oldest] of this.#states) if (this.#states.size > MOST_STATES) this.#states.delete(oldest);
+    return asked;
+  }
+}
+
+const parts = ({ bins, bands }: State): [State['bins'], State['bands']] => [bins, bands];
+
+function tracksOf(records: readonly { content: Uint8Array }[], name: string): Map<number, ObjectTrack> {
+  const tracks = new Map<number, ObjectTrack>();
+  for (const { content } of records) {
+    const track = readTrack(new Cursor(content, name));
+    if (tracks.has(track.object)) throw damaged(name, 'one track of an object', `two of ${track.object}`);
+    if (track.samples.length > 0) tracks.set(track.object, track);
+  }
+  return tracks;
+}
+
+/** States of chunks that share no splats. */
+function mergedStates(states: readonly State[], shDegree: number): State {
+  if (states.length === 1) return states[0];
+  const ids = new Set(states.flatMap(({ bins }) => [...bins.keys()]));
+  const count = (state: State): number => state.bins.get(ATTRIBUTE.flags)?.length ?? 0;
+  const bins = new Map<AttributeId, Int32Array>();
+  for (const id of ids) {
+    const width = Math.max(...states.map((s) => (count(s) > 0 ? (s.bins.get(id)?.length ?? 0) / count(s) : 0)), 1);
+    bins.set(id, concatenated(states.map((s) => s.bins.get(id) ?? new Int32Array(width * count(s)))));
+  }
+  if (states.length === 0) for (const id of Object.values(ATTRIBUTE)) bins.set(id, new Int32Array(0));
+  const bands = Array.from({ length: shDegree }, (_, k) => concatenated(states.map((s) => s.bands[k])));
+  return { bins, bands };
+}
+
+function concatenated(arrays: readonly Int32Array[]): Int32Array {
+  const all = new Int32Array(arrays.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const array of arrays) {
+    all.set(array, at);
+    at += array.length;
+  }
+  return all;
+}

@@ -1,0 +1,180 @@
+/** `.4dgs` files as clips: https://github.com/avala-ai/4dgs. */
+import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import type { LoadLimits } from '../budget.js';
+import { type ClipGroup, type ClipIndex, type ClipPartContent } from '../clip.js';
+import { damaged } from '../faults.js';
+import { MOVING, MOVING_NAMES } from '../motion.js';
+import { FourDgs, type Population } from './four-dgs.js';
+import { sampledMotion, type Moments } from './sampled-motion.js';
+import { presence, type ChangingSplats } from './splats.js';
+
+export { isFourDgs } from './wire.js';
+
+/** Frames a second, unless the file has states or windows of equal length: then so many of these that there are at least the least. */
+const [USUAL_RATE, LEAST_RATE, MOST_RATE] = [30, 24, 120];
+/** Frames of a group at most, and what the largest group may take on the GPU before groups become shorter. */
+const GROUP_FRAMES = [15, 8, 4, 2, 1];
+const MOST_GROUP_BYTES = 64 << 20;
+const ALL_PLANES = MOVING_NAMES.reduce((sum, name) => sum + MOVING[name], 0);
+
+/** A `.4dgs` file that is played as a clip is. Its groups are made when they are asked for. */
+export class FourDgsClip {
+  readonly index: ClipIndex;
+  readonly #file: FourDgs;
+
+  private constructor(file: FourDgs, index: ClipIndex) {
+    this.#file = file;
+    this.index = index;
+  }
+
+  /**
+   * Reads the heads of a file's records, and the splats of its first frame.
+   * @throws GaussianSplatError `decode/header`, `decode/truncated`, `decode/corrupt`, `decode/unsupported`, `decode/empty`, `out-of-memory/budget`
+   */
+  static async open(bytes: Uint8Array, name: string, limits?: LoadLimits): Promise<FourDgsClip> {
+    const file = new FourDgs(bytes, name, limits);
+    const { header } = file.scene;
+    if (header.splats === 0 || file.chunks.length === 0) throw damaged(name, 'splats', 'none', 'decode/header');
+    const framesPerSecond = rateOf(file);
+    const frameCount = Math.max(1, Math.ceil(header.durationSeconds * framesPerSecond - 1e-6));
+    const groups = groupsOf(file, framesPerSecond, frameCount);
+    const first = await firstSplats(file);
+    const bounds = { ...boundsOf(first), ...(file.up && { up: file.up }) };
+    return new FourDgsClip(file, {
+      ...{ framesPerSecond, frameCount, groups, bounds, byteLength: bytes.length },
+      ...{ durationSeconds: frameCount / framesPerSecond, shDegree: header.shDegree, origin: file.origin },
+      ...{ antialiased: false, grow: 1 },
+    });
+  }
+
+  /** The splats of a group and what they do: frames show the middle of their time. Throws as {@link open} does. */
+  async group(number: number): Promise<ClipPartContent> {
+    const { first, frames } = this.index.groups[number];
+    const times = Array.from({ length: frames }, (_, f) => (first + f + 0.5) / this.index.framesPerSecond);
+    const moments = await (this.#file.isKeyed ? this.#keyedMoments(times) : this.#moments(times));
+    return sampledMotion(moments);
+  }
+
+  /** The splats at a time, seconds, as the specification has them. Throws as {@link open} does. */
+  at(seconds: number): Promise<GaussianCloud> {
+    return this.#file.cloudAt(seconds);
+  }
+
+  async #moments(times: readonly number[]): Promise<Moments> {
+    const file = this.#file;
+    const { splats } = await file.population(file.chunksWithin(times[0], times[times.length - 1]));
+    const { cutoff } = file.scene.header;
+    const rows = Array.from({ length: splats.count }, (_, i) => i).filter((i) =>
+      times.some((seconds) => presence(splats, i, seconds, cutoff) > 0),
+    );
+    const list = rows.length > 0 ? rows : splats.count > 0 ? [0] : [];
+    return this.#momentsOf(
+      times,
+      times.map(() => ({ splats, rows: list })),
+    );
+  }
+
+  async #keyedMoments(times: readonly number[]): Promise<Moments> {
+    const file = this.#file;
+    const populations: Population[] = [];
+    for (const seconds of times) populations.push(await file.keyedPopulation(file.stateAt(seconds)));
+    const ids = [...new Set(populations.flatMap((own) => Array.from(own.ids!)))];
+    const rowsIn = new Map(
+      populations.map((own) => [own, new Map(Array.from(own.ids!, (id, row) => [id, row]))] as const),
+    );
+    return this.#momentsOf(
+      times,
+      populations.map((own) => ({ splats: own.splats, rows: ids.map((id) => rowsIn.get(own)!.get(id) ?? -1) })),
+    );
+  }
+
+  #momentsOf(
+    times: readonly number[],
+    states: readonly { readonly splats: ChangingSplats; readonly rows: readonly number[] }[],
+  ): Moments {
+    const { cutoff } = this.#file.scene.header;
+    const isThere = states.map(({ splats, rows }, f) =>
+      Uint8Array.from(rows, (row) => (row >= 0 && presence(splats, row, times[f], cutoff) > 0 ? 1 : 0)),
+    );
+    // Splats that are never seen have a frame all the same: there they have no opacity.
+    const { length } = states[0].rows;
+    for (let k = 0; k < length; k++)
+      if (!isThere.some((there) => there[k]))
+        isThere[
+          Math.max(
+            0,
+            states.findIndex(({ rows }) => rows[k] >= 0),
+          )
+        ][k] = 1;
+    const clouds = states.map(({ splats, rows }, f) =>
+      this.#file.cloudOf(
+        splats,
+        rows.map((row) => Math.max(0, row)),
+        times[f],
+      ),
+    );
+    return { clouds, isThere };
+  }
+}
+
+async function firstSplats(file: FourDgs): Promise<GaussianCloud> {
+  const first = file.chunks.findIndex(({ live }) => live > 0);
+  const { splats } = await (file.isKeyed
+    ? file.keyedPopulation(Math.max(0, first))
+    : file.population([Math.max(0, first)]));
+  if (splats.count === 0) throw damaged(file.scene.name, 'splats', 'none', 'decode/header');
+  const cloud = file.cloudOf(
+    splats,
+    Array.from({ length: splats.count }, (_, i) => i),
+    file.chunks[Math.max(0, first)].from,
+  );
+  return { ...cloud, opacities: splats.opacities };
+}
+
+/** Edges of states or windows that lie at equal distances are those of frames. */
+function rateOf(file: FourDgs): number {
+  const spans = file.isKeyed ? file.chunks.map(({ from, until }) => [from, until]) : file.scene.windows;
+  const edges = [...new Set(spans.flat())].filter((edge) => edge >= 0 && edge < 1e6).sort((a, b) => a - b);
+  const steps = edges.slice(1).map((edge, k) => edge - edges[k]);
+  const rate = 1 / Math.min(...steps);
+  const isEven = steps.length > 1 && steps.every((step) => Math.abs(step * rate - Math.round(step * rate)) < 0.01);
+  if (!isEven || !(rate > 0 && rate <= MOST_RATE)) return USUAL_RATE;
+  const whole = Math.abs(rate - Math.round(rate)) < 1e-3 ? Math.round(rate) : rate;
+  return whole * Math.ceil(LEAST_RATE / whole);
+}
+
+/** Groups of equal length, as long as memory allows; keyframes begin a group. */
+function groupsOf(file: FourDgs, rate: number, frameCount: number): ClipGroup[] {
+  let groups: ClipGroup[] = [];
+  for (const most of GROUP_FRAMES) {
+    groups = [];
+    for (let first = 0; first < frameCount;) {
+      const frames = Math.min(most, endOfGroup(file, first, rate, frameCount) - first);
+      groups.push({ first, frames, parts: [partOf(file, first, frames, rate)] });
+      first += frames;
+    }
+    const largest = Math.max(...groups.map(({ parts: [{ splats, planes }] }) => splats * (56 + 2 * planes)));
+    if (largest <= MOST_GROUP_BYTES) break;
+  }
+  return groups;
+}
+
+/** The first frame that shows a keyframe behind the one that a frame shows. */
+function endOfGroup(file: FourDgs, first: number, rate: number, frameCount: number): number {
+  if (!file.isKeyed) return frameCount;
+  const own = file.stateAt((first + 0.5) / rate);
+  const next = file.chunks.findIndex((chunk, k) => k > own && chunk.reference === undefined);
+  return next < 0 ? frameCount : Math.max(first + 1, Math.round(file.chunks[next].from * rate - 1e-6));
+}
+
+/** Splats and planes at most; it has no bytes of its own in the file. */
+function partOf(file: FourDgs, first: number, frames: number, rate: number): ClipGroup['parts'][number] {
+  const [from, until] = [(first + 0.5) / rate, (first + frames - 0.5) / rate];
+  const own = file.chunksWithin(from, until).map((k) => file.chunks[k]);
+  const splats = file.isKeyed
+    ? own.reduce((sum, { births }, k) => sum + (k === 0 ? 0 : births), own[0]?.live ?? 0)
+    : own.reduce((sum, { live }) => sum + live, 0);
+  // Splats that no object carries move along straight lines and fade.
+  const planes = file.isKeyed ? ALL_PLANES * frames : file.tracks.size > 0 ? 7 * frames : 3 + frames;
+  return { start: 0, sceneBytes: 0, motionBytes: 0, splats: Math.max(1, splats), planes: Math.max(planes, 3) };
+}

@@ -1,0 +1,162 @@
+/** Splats at some moments as a base and curves, which the GPU adds up: the same form that clips of our own have. */
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import type { ClipPartContent } from '../clip.js';
+import { MOVING, MOVING_NAMES, type MovingName, type MovingPart } from '../motion.js';
+import { product } from './tracks.js';
+
+/** The same rows at every moment. */
+export interface Moments {
+  readonly clouds: readonly GaussianCloud[];
+  /** [rows] of each moment: whether a row is there. Where it is not, its numbers say nothing. */
+  readonly isThere: readonly Uint8Array[];
+}
+
+const MOST_CODE = 32_767;
+/** Share of the largest change that counts as none. */
+const NOTHING = 1e-6;
+
+/** One base, and for each attribute that changes either one straight line or as many curves as there are moments. */
+export function sampledMotion({ clouds, isThere }: Moments): ClipPartContent {
+  const [{ count, shDegree }] = clouds;
+  const frames = clouds.length;
+  const first = new Uint16Array(count);
+  const end = new Uint16Array(count);
+  for (let row = 0; row < count; row++) {
+    first[row] = isThere.findIndex((there) => there[row]);
+    end[row] = 1 + isThere.findLastIndex((there) => there[row]);
+  }
+  const base = rowsAt(clouds, first);
+  const parts = Object.fromEntries(
+    MOVING_NAMES.map((name): [MovingName, MovingPart] => {
+      const changes = Array.from({ length: MOVING[name] }, () => new Float32Array(frames * count));
+      for (let f = 0; f < frames; f++)
+        for (let row = 0; row < count; row++)
+          if (isThere[f][row]) putChange(name, base, clouds[f], row, frames, f, changes);
+          else if (name === 'opacity') changes[0][frames * row + f] = -base.opacities[row];
+      return [name, partOf(name, changes, base, first, end, frames)];
+    }),
+  ) as Record<MovingName, MovingPart>;
+  return { cloud: { ...base, shDegree }, motion: { splats: count, frames, parts, lives: { first, end } } };
+}
+
+/** Each row as it is when it is there for the first time. */
+function rowsAt(clouds: readonly GaussianCloud[], moments: Uint16Array): GaussianCloud {
+  const [{ count }] = clouds;
+  const pick = (of: (cloud: GaussianCloud) => Float32Array): Float32Array => {
+    const own = of(clouds[0]).slice();
+    const width = own.length / count;
+    for (let row = 0; row < count; row++)
+      own.set(of(clouds[moments[row]]).subarray(width * row, width * (row + 1)), width * row);
+    return own;
+  };
+  return {
+    ...clouds[0],
+    positions: pick((cloud) => cloud.positions),
+    scales: pick((cloud) => cloud.scales),
+    rotations: pick((cloud) => cloud.rotations),
+    opacities: pick((cloud) => cloud.opacities),
+    sh: pick((cloud) => cloud.sh),
+  };
+}
+
+/** What an attribute of a row differs by from its base, in the numbers of `Motion`. */
+function putChange(
+  name: MovingName,
+  base: GaussianCloud,
+  cloud: GaussianCloud,
+  row: number,
+  frames: number,
+  frame: number,
+  changes: readonly Float32Array[],
+): void {
+  const at = frames * row + frame;
+  if (name === 'opacity') changes[0][at] = cloud.opacities[row] - base.opacities[row];
+  else if (name === 'rotation')
+    turnBetween(base.rotations, cloud.rotations, row).forEach((v, k) => (changes[k][at] = v));
+  else
+    for (let k = 0; k < 3; k++) {
+      if (name === 'position') changes[k][at] = cloud.positions[3 * row + k] - base.positions[3 * row + k];
+      if (name === 'scale') changes[k][at] = Math.log(cloud.scales[3 * row + k] / base.scales[3 * row + k]);
+      const width = 3 * shCoefficientCount(cloud.shDegree);
+      if (name === 'color') changes[k][at] = cloud.sh[width * row + k] - base.sh[width * row + k];
+    }
+}
+
+/** An axis as long as the angle of the rotation from one to the other. */
+function turnBetween(from: Float32Array, to: Float32Array, row: number): readonly number[] {
+  const at = 4 * row;
+  let same = true;
+  for (let k = 0; k < 4; k++) same &&= from[at + k] === to[at + k];
+  if (same) return [0, 0, 0];
+  const inverse = [from[at], -from[at + 1], -from[at + 2], -from[at + 3]];
+  const [w, x, y, z] = product(Array.from(to.subarray(at, at + 4)), inverse);
+  const sine = Math.hypot(x, y, z);
+  if (sine === 0) return [0, 0, 0];
+  const angle = 2 * Math.atan2(sine, Math.abs(w)) * Math.sign(w || 1);
+  return [x, y, z].map((value) => (angle * value) / sine);
+}
+
+function partOf(
+  name: MovingName,
+  changes: readonly Float32Array[],
+  base: GaussianCloud,
+  first: Uint16Array,
+  end: Uint16Array,
+  frames: number,
+): MovingPart {
+  const largest = changes.reduce((most, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), most), 0);
+  const still: MovingPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
+  if (largest === 0) return still;
+  const lines = name === 'position' ? linesOf(changes, first, end, frames, leastOf(base, largest)) : undefined;
+  if (lines) {
+    // Bases move back to where the line is at frame 0.
+    lines.forEach((own, k) => own.forEach((slope, row) => (base.positions[3 * row + k] -= slope * first[row])));
+    const codes = coded(lines, 1);
+    return {
+      rank: 1,
+      step: codes.step,
+      curves: Float32Array.from({ length: frames }, (_, f) => f),
+      codes: codes.codes,
+    };
+  }
+  const curves = new Float32Array(frames * frames);
+  for (let f = 0; f < frames; f++) curves[frames * f + f] = 1;
+  return { rank: frames, curves, ...coded(changes, frames) };
+}
+
+/** What a change must exceed to count: positions are rounded to 32 bits. */
+const leastOf = ({ positions }: GaussianCloud, largest: number): number =>
+  Math.max(NOTHING * largest, positions.reduce((most, value) => Math.max(most, Math.abs(value)), 0) * 2 ** -22);
+
+/** Slopes of rows that all follow straight lines; undefined if one does not. */
+function linesOf(
+  changes: readonly Float32Array[],
+  first: Uint16Array,
+  end: Uint16Array,
+  frames: number,
+  least: number,
+): Float32Array[] | undefined {
+  const slopes = changes.map(() => new Float32Array(first.length));
+  for (let k = 0; k < changes.length; k++)
+    for (let row = 0; row < first.length; row++) {
+      const [begin, last] = [first[row], end[row] - 1];
+      const own = changes[k].subarray(frames * row, frames * (row + 1));
+      const slope = last > begin ? own[last] / (last - begin) : 0;
+      for (let f = begin + 1; f < last; f++)
+        if (Math.abs(own[f] - slope * (f - begin)) > Math.max(least, 1e-5 * Math.abs(own[last]))) return undefined;
+      slopes[k][row] = slope;
+    }
+  return slopes;
+}
+
+/** Rounds numbers to 16 bits: [rank] values of each row become a plane each. */
+function coded(numbers: readonly Float32Array[], rank: number): { step: number; codes: Int16Array[] } {
+  const largest = numbers.reduce((most, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), most), 0);
+  const step = largest > 0 ? largest / MOST_CODE : 1;
+  const codes = numbers.flatMap((own) =>
+    Array.from({ length: rank }, (_, k) =>
+      Int16Array.from({ length: own.length / rank }, (__, row) => Math.round(own[rank * row + k] / step)),
+    ),
+  );
+  return { step, codes };
+}
