@@ -32,7 +32,10 @@ function room(): void {
 }
 
 /** An element whose object is placed, and the scene's frame to that of the view. */
-async function start(attributes: Readonly<Record<string, string>>): Promise<[GaussianSplatElement, ArrayLike<number>]> {
+async function start(
+  attributes: Readonly<Record<string, string>>,
+  prepare: (element: GaussianSplatElement) => void = () => undefined,
+): Promise<[GaussianSplatElement, ArrayLike<number>]> {
   // The emulator draws two views; those of a phone are at one place.
   headset().device.ipd = 0;
   room();
@@ -52,6 +55,7 @@ async function start(attributes: Readonly<Record<string, string>>): Promise<[Gau
   };
   try {
     const element = await showLoaded({ src: COMPASS, ar: '', ...STILL, ...attributes });
+    prepare(element);
     const button = (): HTMLButtonElement | null => element.shadowRoot!.querySelector('[part=ar-button]');
     await until(() => button() !== null, 'the button', LIMIT_MS);
     button()!.click();
@@ -107,6 +111,40 @@ describe('AR', () => {
     assert(size > 0.45 && size < 1.05, `${size} m`);
     element.exitXR!();
     await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+  });
+
+  itInLab("the element's labels stand over the camera's image at their points, and return to the page", async () => {
+    const label = Object.assign(document.createElement('button'), { slot: 'hotspot-top', textContent: 'Top' });
+    const [element, m] = await start({}, (shown) => {
+      const { x, y, z } = shown.getCameraTarget();
+      label.dataset.position = `${x} ${y} ${z}`;
+      shown.append(label);
+    });
+    const overlay = element.shadowRoot!.querySelector('.ar-overlay')!;
+    await until(() => label.assignedSlot?.closest('.ar-overlay') === overlay, 'a place in the overlay', LIMIT_MS);
+    await frames(4);
+    const box = label.getBoundingClientRect();
+    const around = overlay.getBoundingClientRect();
+    const at = [(box.x + box.width / 2 - around.x) / around.width, (box.y + box.height / 2 - around.y) / around.height];
+    const { bounds } = (element as unknown as { stage: { camera: { bounds: { center: number[] } } } }).stage.camera;
+    const row = (r: number): number =>
+      bounds.center.reduce((sum, value, k) => sum + m[4 * r + k] * value, m[4 * r + 3]);
+    const [x, y, z] = [row(0), row(1), row(2)];
+    // Off-center eyes of 160 by 168 pixels: 52 degrees to one side, 42 to the other; 46 up, 50 down.
+    const tan = (degrees: number): number => Math.tan((degrees * Math.PI) / 180);
+    const seen = [
+      [52, 42],
+      [42, 52],
+    ].map(([l, r]) => (x / z + tan(l)) / (tan(l) + tan(r)));
+    const up = (y / z + tan(46)) / (tan(46) + tan(50));
+    assert(
+      seen.some((own) => Math.abs(own - at[0]) < 0.02),
+      `${at[0]} across, ${seen.join(' or ')} expected`,
+    );
+    assert(Math.abs(up - at[1]) < 0.02, `${at[1]} down, ${up} expected`);
+    element.exitXR!();
+    await until(() => element.getAttribute('ar-status') === 'not-presenting', 'an end', LIMIT_MS);
+    assert(label.assignedSlot?.closest('#hotspots'), 'the label is back in the page');
   });
 
   itInLab('on iPhones is a link to the model of the author, by its honest name; else nothing', async () => {

@@ -1,4 +1,5 @@
 import { css } from 'lit';
+import { ArLabels } from './ar-labels.js';
 import type { XrHost } from './xr-host.js';
 import { languageOf } from '../words.js';
 import { WORDS } from './xr-offer.js';
@@ -31,9 +32,10 @@ export const AR_STYLES = css`
   }
 `;
 
-/** Overlay of an AR session on a phone: an exit button, and the author's prompt until the object is placed. */
+/** Overlay of an AR session on a phone: an exit button, the author's prompt until the object is placed, and its labels from then on. */
 export class ArOverlay {
   readonly root: HTMLElement;
+  readonly labels: ArLabels;
   readonly #core: XrHost;
   readonly #prompt: HTMLSlotElement;
   readonly #exit: HTMLButtonElement;
@@ -54,8 +56,10 @@ export class ArOverlay {
     this.root.addEventListener('beforexrselect', (event) => {
       if (event.composedPath().includes(slot)) event.preventDefault();
     });
+    this.labels = new ArLabels(element, this.root);
     this.root.append(this.#prompt, slot);
-    element.shadowRoot!.append(this.root);
+    // The first slot of a name gets the children that ask for it.
+    element.shadowRoot!.prepend(this.root);
   }
 
   show(): void {
@@ -68,9 +72,11 @@ export class ArOverlay {
 
   placed(): void {
     this.#prompt.hidden = true;
+    this.labels.show();
   }
 
   hide(): void {
     this.root.classList.remove('shown');
+    this.labels.hide();
   }
 }

@@ -1,4 +1,4 @@
-import { multiply, type Vector3 } from '@gaussian-splat/core';
+import { multiply, type Camera, type Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import { toViewer } from '../camera/orbit.js';
 import type { XrHost } from './xr-host.js';
@@ -93,6 +93,7 @@ class ArGuide implements XrGuide {
   #anchor: XrAnchor | undefined;
   #isAnchored = false;
   #fingers: Fingers | undefined;
+  #placed: Float64Array | undefined;
 
   constructor(core: XrHost, of: XrStarted, overlay: ArOverlay) {
     this.#core = core;
@@ -126,7 +127,13 @@ class ArGuide implements XrGuide {
     if (!this.#at) return null;
     this.#follow(frame);
     this.#touch(frame);
-    return this.#matrix(this.#at, this.#footprint);
+    return (this.#placed = this.#matrix(this.#at, this.#footprint));
+  }
+
+  drawAbove(room: Camera): void {
+    if (!this.#placed) return;
+    const worldToCamera = multiply(room.worldToCamera, this.#placed);
+    this.#overlay.labels.place({ ...room, worldToCamera }, this.#stage.frame);
   }
 
   drawBelow(

@@ -239,16 +239,20 @@ const ANSWERS = {
   },
 
   /**
-   * A clip of one ball that changes its colour and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer comes so many milliseconds later;
+   * A clip of one ball that changes its colour and place, with a splat that is in every other frame alone; groups of four frames, ten a second. `whole`: without byte ranges; `slow`: each answer comes so many milliseconds later, and as late as `mbps` and at least `padded` bytes make it;
    * `gate`: what follows the first group comes once it is opened; `lost`: a group that is not there.
    */
   async clip(context) {
-    const { frames = '12', whole, slow = '0', lost, gate } = context.query;
+    const { frames = '12', whole, slow = '0', mbps = '0', padded = '0', lost, gate } = context.query;
     // A refusal, too. A 404 would be of the whole file: browsers give it to requests for other ranges.
     context.set('Cache-Control', 'no-store');
     const { bytes, starts } = await clipOf(Number(frames));
     const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(context.get('Range')) ?? [];
-    if (slow !== '0' && Number(first) > 0) await new Promise((resolve) => setTimeout(resolve, Number(slow)));
+    if (slow !== '0' && Number(first) > 0) {
+      const ownBytes = Math.max(Number(padded), Number(last) + 1 - Number(first));
+      const transfer = mbps === '0' ? 0 : (8 * ownBytes) / (1000 * Number(mbps));
+      await new Promise((resolve) => setTimeout(resolve, Number(slow) + transfer));
+    }
     if (gate && Number(first) >= starts[1]) await gateOf(gate).opened;
     if (lost && Number(first) >= starts[Number(lost)] && !(Number(first) >= starts[Number(lost) + 1]))
       return void (context.status = 416);
