@@ -4,6 +4,7 @@ import { PNG } from 'pngjs';
 import { cameraFromCalibration, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
+import { clipMoment, isClip } from './lib/clip-frame.mjs';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
@@ -15,6 +16,7 @@ const USAGE = `usage: gaussian-splat render SCENE --camera CAMERA.json --out IMA
                        or {views: [...]} together with --view NAME
   --out FILE           8-bit PNG, alpha not premultiplied
   --float FILE         width*height*4 little-endian float32, premultiplied RGBA, row by row from the top
+  --time SECONDS       the moment of a clip (.gsv, .4dgs; default 0), for a poster
   --view NAME          the view of that name (or number) in a file of several
   --filter NAME        classic, antialiased (0.3 px² with compensation) or mip (0.1 px²); default: what the scene file says.
                        --mode is another name of it
@@ -31,6 +33,7 @@ function parseOptions(args) {
     out: text,
     float: text,
     view: text,
+    time: { ...text, default: '0' },
     filter: text,
     mode: text,
     raster: { ...text, default: 'auto' },
@@ -41,6 +44,7 @@ function parseOptions(args) {
   const { values } = parsed;
   if (values.camera === undefined) throw new UsageError('--camera is missing');
   if (values.out === undefined && values.float === undefined) throw new UsageError('--out or --float is missing');
+  if (!(Number(values.time) >= 0)) throw new UsageError(`--time: expected seconds from 0 on, found "${values.time}"`);
   values.filter ??= values.mode;
   oneOf('--filter', values.filter, [undefined, 'classic', 'antialiased', 'mip']);
   oneOf('--raster', values.raster, ['auto', 'quads', 'tiles']);
@@ -82,8 +86,9 @@ function readCamera(path, name) {
 }
 
 /** Other files of a scene are in the folder of the named one. */
-async function readSceneFile(name) {
+async function readSceneFile(name, seconds) {
   const path = resolve(from, name);
+  if (isClip(name)) return clipMoment(await readWhole(path), name, seconds);
   const openPart = (part) => readWhole(join(dirname(path), part));
   return readScene(await readWhole(path), { name, openPart });
 }
@@ -123,7 +128,7 @@ function checkFiles({ scene, camera, out, float }) {
 async function render(options) {
   checkFiles(options);
   const camera = readCamera(options.camera, options.view);
-  const cloud = await readSceneFile(options.scene);
+  const cloud = await readSceneFile(options.scene, Number(options.time));
   sayWarnings(options.scene, cloud);
   const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
 

@@ -2,8 +2,10 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import type { Tracks } from './tracks.js';
 
-/** One of this many neighboring splats is in the coarse part, so that every region is represented. */
-export const COARSE_RUN = 8;
+/** One of at least this many neighboring splats is in the coarse part, so that every region is represented. */
+const COARSE_RUN = 8;
+/** Splats of the coarse part at most, approximately: at 30 bytes each the first frame arrives within 1.7 s at 2 Mbit/s. */
+const MOST_COARSE = 12_000;
 
 /**
  * Divides tracks into the coarse part, which gives an image on its own, and the rest.
@@ -17,8 +19,9 @@ export function coarseAndRest(cloud: GaussianCloud, { lives, frames }: Tracks): 
   };
   const coarse: number[] = [];
   const rest: number[] = [];
-  for (let at = 0; at < order.length; at += COARSE_RUN) {
-    const run = [...order.subarray(at, at + COARSE_RUN)];
+  const length = Math.max(COARSE_RUN, Math.ceil(order.length / MOST_COARSE));
+  for (let at = 0; at < order.length; at += length) {
+    const run = [...order.subarray(at, at + length)];
     const weights = run.map(weightOf);
     const best = weights.indexOf(Math.max(...weights));
     run.forEach((i, k) => (k === best ? coarse : rest).push(i));

@@ -60,7 +60,7 @@ const FINER = 16;
 /** Measured frames of a group, as fractions of its duration, and views of each. */
 const JUDGED = [0.2, 0.75];
 const VIEWS = 2;
-const GROWTHS = [1, 1.25, 1.6, 2, 2.5];
+const GROWTHS = [1, 1.25, 1.6, 2, 2.5, 3.2, 4];
 
 /**
  * Encodes frames with arbitrary splats as a clip. Quantization is as coarse as images of some frames, in held-out
