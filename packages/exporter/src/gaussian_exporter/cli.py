@@ -34,6 +34,7 @@ from .families.hexplane import export_hexplane
 from .families.image_filter import export_image_filter
 from .families.scaffold import export_scaffold
 from .families.spacetime import export_spacetime
+from .frames import write_frames
 from .graph import Weights
 from .header import contract_faults, header_faults
 from .outputs import Options, refuse_instances, save
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; 0 if all went well, 1 with a message for people if not, 2 for wrong options."""
     given = parser().parse_args(arguments)
     try:
-        {"check": check, "cost": cost}.get(given.family, export)(given)
+        {"check": check, "cost": cost, "frames": frames}.get(given.family, export)(given)
     except ExportError as error:
         print(f"gaussian-export: {error}", file=sys.stderr)
         return 1
@@ -71,6 +72,11 @@ def parser() -> Command:
     counter.add_argument("file", type=Path)
     counter.add_argument("--instances", type=positive, default=1, help="instances in one run, if the file has an axis")
     counter.add_argument("--rows", type=positive, default=12, help="nodes to list, the dearest first; default 12")
+    player = families.add_parser("frames", help="moments of a generator as PLY files, to make a clip of")
+    player.add_argument("file", type=Path, help="an .onnx file that an export wrote")
+    player.add_argument("folder", type=Path, help="where frames.json and the frames are written")
+    player.add_argument("--fps", type=float, default=30.0, help="frames a second; default 30")
+    player.add_argument("--duration", type=float, help="seconds; default: the contract's")
     return root
 
 
@@ -137,6 +143,15 @@ def cost(given: argparse.Namespace) -> None:
     model = loaded(given.file)
     for line in report(cost_of(model, given.instances), given.rows):
         print(line)
+
+
+def frames(given: argparse.Namespace) -> None:
+    """Writes moments of a generator, and says how to make a clip of them."""
+    if not given.fps > 0:
+        raise ExportError("argument/value", where="--fps", expected="more than 0", found=str(given.fps), remedy="30")
+    count = write_frames(loaded(given.file), given.file, given.folder, given.fps, given.duration)
+    print(f"{given.folder}/frames.json: {count} frames")
+    print(f"a clip: npx gaussian-splat sequence {given.folder}/frames.json --out {given.file.stem}.gsv")
 
 
 def check(given: argparse.Namespace) -> None:

@@ -1,0 +1,85 @@
+"""Moments of generators as PLY files: the same Gaussians that the generator writes, for every family that moves."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+
+from gaussian_exporter.checkpoints.moving import gaussian4d_of
+from gaussian_exporter.cli import main
+from gaussian_exporter.families.deformable import export_deformable
+from gaussian_exporter.families.gaussian4d import export_gaussian4d
+from gaussian_exporter.families.hexplane import export_hexplane
+from gaussian_exporter.families.spacetime import export_spacetime
+from gaussian_exporter.frames import SH_C0
+from gaussian_exporter.outputs import Options
+
+from . import test_hexplane, test_moving
+from .running import FACTS, covariance, error, parts, run
+from .test_classic import cloud
+
+
+def four_dimensional() -> Any:
+    return gaussian4d_of(Path("x"), test_moving.captured(), {"time_duration": [0.0, 10.0]})
+
+
+FAMILIES: dict[str, Any] = {
+    "spacetime": lambda options: export_spacetime(test_moving.spacetime(), FACTS, options),
+    "deformable": lambda options: export_deformable(cloud(50, 3), test_moving.deform(), FACTS, options),
+    "4dgs": lambda options: export_gaussian4d(four_dimensional(), FACTS, options),
+    "4dgaussians": lambda options: export_hexplane(test_hexplane.small(), test_hexplane.deformation(), FACTS, options),
+}
+
+
+def read_ply(path: Path) -> dict[str, Any]:
+    head, _, body = path.read_bytes().partition(b"end_header\n")
+    names = [line.split()[-1] for line in head.decode().splitlines() if line.startswith("property")]
+    rows = np.frombuffer(body, "<f4").reshape(-1, len(names))
+    return {name: rows[:, k].astype(np.float64) for k, name in enumerate(names)}
+
+
+@pytest.mark.parametrize("layout", ["split", "packed"])
+@pytest.mark.parametrize("family", FAMILIES)
+def test_frames_are_what_the_generator_writes(family: str, layout: Any, tmp_path: Path) -> None:
+    model = FAMILIES[family](Options(layout))
+    onnx.save(model, tmp_path / "model.onnx")
+    folder = tmp_path / "frames"
+    assert main(["frames", str(tmp_path / "model.onnx"), str(folder), "--fps", "4"]) == 0
+    manifest = json.loads((folder / "frames.json").read_text())
+    # Two seconds, in which the normalized time goes from 0 to 1.
+    assert (manifest["count"], manifest["framesPerSecond"]) == (8, 4)
+    for frame in (0, 3, 7):
+        expected = parts(run(model, {"time": np.array([frame / 8])}))
+        found = read_ply(folder / f"frame-{frame + 1:04}.ply")
+        stacked = {k: np.stack([found[f"{k}_{i}"] for i in range(n)], 1) for k, n in (("scale", 3), ("rot", 4))}
+        assert error(np.stack([found[k] for k in "xyz"], 1), expected["positions"]) < 1e-5
+        turned = covariance(np.exp(stacked["scale"]), stacked["rot"])
+        assert np.abs(turned - expected["covariances"]).max() < 2e-4 * np.abs(expected["covariances"]).max()
+        opacities = 1 / (1 + np.exp(-found["opacity"]))
+        assert np.abs(opacities - expected["opacities"][:, 0]).max() < 2e-6
+        first = np.stack([found[f"f_dc_{k}"] for k in range(3)], 1)
+        colour = expected["colour"]
+        given = (colour - 0.5) / SH_C0 if colour.shape[1] == 3 and "f_rest_0" not in found and is_rgb(model) else colour
+        assert error(first, given[:, :3]) < 1e-5
+        if colour.shape[1] > 3:
+            count = colour.shape[1] // 3
+            rest = np.stack([found[f"f_rest_{k}"] for k in range(3 * (count - 1))], 1)
+            assert error(rest, colour.reshape(-1, count, 3)[:, 1:].transpose(0, 2, 1).reshape(len(colour), -1)) < 1e-5
+
+
+def is_rgb(model: onnx.ModelProto) -> bool:
+    contract = next(json.loads(each.value) for each in model.metadata_props if "outputs" in each.value)
+    return contract["outputs"].get("color") == "rgb" or "colors" in contract["outputs"]
+
+
+def test_what_does_not_move_has_no_frames(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from gaussian_exporter.families.classic import export_classic
+
+    onnx.save(export_classic(cloud(20, 0), FACTS), tmp_path / "still.onnx")
+    assert main(["frames", str(tmp_path / "still.onnx"), str(tmp_path / "frames")]) == 1
+    assert "input of the role time" in capsys.readouterr().err
