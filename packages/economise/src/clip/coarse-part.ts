@@ -19,9 +19,9 @@ export function coarseAndRest(cloud: GaussianCloud, { lives, frames }: Tracks): 
   };
   const coarse: number[] = [];
   const rest: number[] = [];
-  const length = Math.max(COARSE_RUN, Math.ceil(order.length / MOST_COARSE));
-  for (let at = 0; at < order.length; at += length) {
-    const run = [...order.subarray(at, at + length)];
+  const runLength = Math.max(COARSE_RUN, Math.ceil(order.length / MOST_COARSE));
+  for (let at = 0; at < order.length; at += runLength) {
+    const run = [...order.subarray(at, at + runLength)];
     const weights = run.map(weightOf);
     const best = weights.indexOf(Math.max(...weights));
     run.forEach((i, k) => (k === best ? coarse : rest).push(i));

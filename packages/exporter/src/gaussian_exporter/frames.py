@@ -27,7 +27,8 @@ def write_frames(model: onnx.ModelProto, path: Path, folder: Path, fps: float, d
     import onnxruntime as ort
 
     contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
-    clocks = {name: each for name, each in cast(Json, contract["inputs"]).items() if each["role"] == "time"}
+    inputs = cast("dict[str, Json]", contract["inputs"])
+    clocks = {name: each for name, each in inputs.items() if each["role"] == "time"}
     seconds = duration or cast("float | None", contract.get("duration"))
     if not clocks:
         raise _wrong("an input of the role time", "none", "export a model that moves")
