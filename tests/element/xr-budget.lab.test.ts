@@ -6,7 +6,7 @@ import { after, before, test } from 'node:test';
 import { USUAL_STEPS } from '@gaussian-splat/economise/pages';
 import { deflateQuickly } from '../../packages/cli/src/lib/encoders.mjs';
 import { loadScene } from '../../packages/element/src/loading/load-scene.js';
-import type { LoadedScene, SceneRequest } from '../../packages/element/src/loading/protocol.js';
+import type { SceneRequest } from '../../packages/element/src/loading/protocol.js';
 import { openXrScene, type XrSceneSource } from '../../packages/element/src/xr/xr-scene.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { detailFolder } from '../support/detail-folder.js';
@@ -42,7 +42,7 @@ async function loaded(isHandheld: boolean): Promise<number> {
   let count = 0;
   const loader = {
     load: async (request: SceneRequest, signal: AbortSignal) => {
-      const scene: LoadedScene = await loadScene(request, signal, { onProgress: () => undefined });
+      const scene = await loadScene(request, signal, { onProgress: () => undefined });
       assert.ok('packed' in scene && scene.packed);
       ({ count } = scene.packed);
       throw uploads;

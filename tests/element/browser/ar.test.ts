@@ -126,7 +126,7 @@ describe('AR', () => {
     const box = label.getBoundingClientRect();
     const around = overlay.getBoundingClientRect();
     const at = [(box.x + box.width / 2 - around.x) / around.width, (box.y + box.height / 2 - around.y) / around.height];
-    const { bounds } = (element as unknown as { stage: { camera: { bounds: { center: number[] } } } }).stage.camera;
+    const { bounds } = (element as unknown as { core: { camera: { bounds: { center: number[] } } } }).core.camera;
     const row = (r: number): number =>
       bounds.center.reduce((sum, value, k) => sum + m[4 * r + k] * value, m[4 * r + 3]);
     const [x, y, z] = [row(0), row(1), row(2)];

@@ -133,7 +133,7 @@ class ArGuide implements XrGuide {
   drawAbove(room: Camera): void {
     if (!this.#placed) return;
     const worldToCamera = multiply(room.worldToCamera, this.#placed);
-    this.#overlay.labels.place({ ...room, worldToCamera }, this.#stage.frame);
+    this.#overlay.labels.place({ ...room, worldToCamera }, this.#core.frame);
   }
 
   drawBelow(
