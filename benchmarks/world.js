@@ -1,6 +1,7 @@
 /** The page of several scenes in one image: each case is measured in bursts between bursts of what it is compared with. See docs/benchmark.md. */
 import { fetchScene, readScene } from '@gaussian-splat/formats';
 import { settings } from '@gaussian-splat/renderer';
+import { addShadow, cutScenes } from './scene/effects.js';
 import { element, showError, showProgress } from './page/show.js';
 import { describeEnvironment, openDevice } from './run/environment.js';
 import { visit } from './run/measure.js';
@@ -29,7 +30,12 @@ function readPlan(query) {
   const numbers = { n: 1e6, width: 1920, height: 1080, frames: 80, rounds: 2, warmup: 20 };
   const plan = Object.fromEntries(Object.entries(numbers).map(([name, usual]) => [name, whole(name, usual)]));
   const options = JSON.parse(query.get('options') ?? '{}');
-  return { ...plan, scene: query.get('scene') || '../scenes/skull.spz', path: query.get('path') ?? 'among', options };
+  const only = query.get('only') ?? '';
+  return {
+    ...{ ...plan, options, only },
+    scene: query.get('scene') || '../scenes/skull.spz',
+    path: query.get('path') ?? 'among',
+  };
 }
 
 /** Deals the copies out to so many scenes, so that all of them lie among one another. */
@@ -56,6 +62,17 @@ const CASES = [
     ...{ name: `${MANY} scenes, one faded in each frame`, of: MANY, beside: 'the same, still', besideOf: MANY },
     eachFrame: ({ placements }, frame) => (placements[1].opacity = 0.9 + 0.1 * (frame % 2)),
   },
+  ...['tint', 'hide'].flatMap((effect) => [
+    {
+      ...{ name: `a cut with the effect ${effect} that moves in each frame`, of: 1, beside: 'the same, still' },
+      ...{ besideOf: 1, effects: { cut: effect, moves: true }, besideEffects: { cut: effect } },
+    },
+    {
+      ...{ name: `a cut with the effect ${effect} that moves in each frame`, of: 1, beside: 'no cut' },
+      ...{ besideOf: 1, effects: { cut: effect, moves: true } },
+    },
+  ]),
+  { name: 'a contact shadow', of: 1, beside: 'none', besideOf: 1, effects: { shadow: true } },
 ];
 
 class Measurement {
@@ -76,6 +93,7 @@ class Measurement {
     this.cloud = firstSplats(whole, base);
     const { radius, copies } = placeCopies({ base, count: base * Math.max(MANY, Math.round(n / base)) });
     this.copies = copies;
+    this.radius = radius;
     this.cameras = camerasAlong({ path, width, height, frames, radius });
   }
 
@@ -90,20 +108,22 @@ class Measurement {
     return this.#uploads.get(count);
   }
 
-  async subject(count, eachFrame) {
+  async subject(count, eachFrame, { cut, moves, shadow } = {}) {
+    const { device } = this.#gpu;
     const { width, height, options } = this.#plan;
     const settled = settings('default', options);
-    return new WorldSubject(this.#gpu.device, await this.scenes(count), {
-      width,
-      height,
-      settings: settled,
-      eachFrame,
-    });
+    const how = { width, height, settings: settled, eachFrame };
+    if (cut)
+      how.eachFrame = await cutScenes(device, await this.scenes(count), { effect: cut, moves, radius: this.radius });
+    const subject = new WorldSubject(device, await this.scenes(count), how);
+    if (shadow) await addShadow(device, subject.world, this.radius);
+    return subject;
   }
 
-  async compare({ name, of, beside, besideOf, eachFrame }) {
+  async compare({ name, of, beside, besideOf, eachFrame, effects, besideEffects }) {
     const { rounds, warmup } = this.#plan;
-    const [own, standard] = [await this.subject(of, eachFrame), await this.subject(besideOf)];
+    const own = await this.subject(of, eachFrame, effects);
+    const standard = await this.subject(besideOf, undefined, besideEffects);
     try {
       for (let i = 0; i < warmup; i++) standard.draw(this.cameras[i % this.cameras.length], false);
       await standard.finish();
@@ -213,11 +233,12 @@ async function measure(plan) {
   showProgress(`loading ${plan.scene}`);
   await measurement.load();
   const results = [];
-  for (const each of CASES) {
+  for (const each of CASES.filter(({ name }) => name.includes(plan.only))) {
     results.push(await measurement.compare(each));
     show(results);
   }
-  const changes = await measurement.changes();
+  if (results.length === 0) throw new RangeError(`only: expected a part of the name of a case, found "${plan.only}"`);
+  const changes = plan.only ? undefined : await measurement.changes();
   const splats = results[0].facts.own.splats;
   return { kind: 'world', plan, splats, environment: describeEnvironment(gpu), results, changes, errors: gpu.errors };
 }

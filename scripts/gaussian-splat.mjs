@@ -9,7 +9,7 @@ const args = process.argv.slice(2);
 ensureDependencies();
 if (args[0] === 'page') ensureElement();
 else ensurePackages();
-const draws = ['render', 'economise'].includes(args[0]);
+const draws = ['render', 'video', 'economise'].includes(args[0]);
 // On Linux, Dawn in Node uses the SwiftShader that comes with Chromium.
 if (draws && process.platform === 'linux' && process.env.GAUSSIAN_SPLAT_GPU !== 'system' && !findSwiftShader())
   ensureChromium();

@@ -17,8 +17,12 @@ const LARGEST_SCALE = 1000.0;
 // Minimum scale: a splat without a size would have no image.
 const SMALLEST_SCALE = 1e-4;
 
-// State of the current splat: fractions that the cuts change, and the arguments of the hook.
-var<private> cut_shares: array<f32, MOST_CUTS>;
+// State of the current splat: rows of the affine map of colors that the cuts make together, and the arguments of the
+// hook.
+var<private> cut_has_color: bool;
+var<private> cut_red: vec4f;
+var<private> cut_green: vec4f;
+var<private> cut_blue: vec4f;
 var<private> hooked_position: vec3f;
 var<private> hooked_opacity: f32;
 var<private> visible_opacity: f32;
@@ -39,12 +43,39 @@ fn scale_gaussian(g: ptr<function, Gaussian>, factor: f32) {
   (*g).factor_z *= factor;
 }
 
+// Appends a fraction of the map of a cut to the map of colors.
+fn compose_colors(k: u32, share: f32) {
+  let red = mapped_row(modifiers.cuts[k].red);
+  let green = mapped_row(modifiers.cuts[k].green);
+  let blue = mapped_row(modifiers.cuts[k].blue);
+  cut_red = mix(cut_red, red, share);
+  cut_green = mix(cut_green, green, share);
+  cut_blue = mix(cut_blue, blue, share);
+  cut_has_color = true;
+}
+
+// Row of the product of a map of colors and the map so far.
+fn mapped_row(row: vec4f) -> vec4f {
+  return row.x * cut_red + row.y * cut_green + row.z * cut_blue + vec4f(0.0, 0.0, 0.0, row.w);
+}
+
 fn apply_cuts(g: ptr<function, Gaussian>) {
   let found = *g;
+  cut_has_color = false;
+  cut_red = vec4f(1.0, 0.0, 0.0, 0.0);
+  cut_green = vec4f(0.0, 1.0, 0.0, 0.0);
+  cut_blue = vec4f(0.0, 0.0, 1.0, 0.0);
   for (var k = 0u; k < modifiers.cut_count; k++) {
-    let share = share_cut(modifiers.cuts[k], found);
-    cut_shares[k] = share;
-    (*g).opacity *= mix(1.0, modifiers.cuts[k].opacity, share);
+    let inside = share_in_shape(k, found);
+    let share = select(inside, 1.0 - inside, modifiers.cuts[k].is_outside != 0u);
+    if (share <= 0.0) { continue; }
+    if (modifiers.cuts[k].has_color != 0u) { compose_colors(k, share); }
+    let mass = mix(1.0, modifiers.cuts[k].opacity, share);
+    if (share < 1.0 && mass < 1.0 && mass > LEAST_MASS && modifiers.cuts[k].edge >= 0.0) {
+      trim_gaussian(g, found, k, inside);
+    } else {
+      (*g).opacity *= mass;
+    }
     (*g).opacity = thinned_opacity((*g).opacity, mix(1.0, modifiers.cuts[k].thinned, share));
     (*g).position += share * modifiers.cuts[k].offset;
   }
@@ -104,11 +135,9 @@ fn modified_gaussian(found: FoundGaussian) -> Gaussian {
 fn pack_modified(ellipse: Ellipse, color: vec3f) -> ProjectedSplat {
   var e = ellipse;
   var c = color;
-  for (var k = 0u; k < modifiers.cut_count; k++) {
-    if (modifiers.cuts[k].has_color == 0u) { continue; }
+  if (cut_has_color) {
     let before = vec4f(c, 1.0);
-    let after = vec3f(dot(modifiers.cuts[k].red, before), dot(modifiers.cuts[k].green, before), dot(modifiers.cuts[k].blue, before));
-    c = mix(c, after, cut_shares[k]);
+    c = vec3f(dot(cut_red, before), dot(cut_green, before), dot(cut_blue, before));
   }
   if (modifiers.is_hooked != 0u) {
     let wanted = hook_values(c);

@@ -145,14 +145,20 @@ test('several cuts act one after the other, and a modifier without any leaves th
   buffers.destroy();
 });
 
-test('a splat across a plane changes by the share below it; a shape without a volume changes nothing', () => {
+test('a splat across a plane is trimmed to what lies above it; a shape without a volume changes nothing', () => {
   const one: GaussianCloud = {
     ...blobs(1),
-    positions: Float32Array.of(0, 0.1, 0),
+    positions: Float32Array.of(0, 0, 0),
     scales: Float32Array.of(0.1, 0.1, 0.1),
   };
   const plane: SplatCut = { shape: 'plane', shapeToWorld: stretch(1), opacity: 0 };
-  const left = cutCloud(one, [plane]).cloud.opacities[0] / one.opacities[0];
-  assert.ok(Math.abs(left - normalBelow(1)) < 1e-6, `${left}`);
+  const { cloud } = cutCloud(one, [plane]);
+  // Of half of a normal distribution: its mean, and its variance.
+  const [mean, variance] = [Math.sqrt(2 / Math.PI), 1 - 2 / Math.PI];
+  assert.ok(Math.abs(cloud.positions[1] - 0.1 * mean) < 1e-6, `${cloud.positions[1]}`);
+  const found = cloud.axes![0].map((row) => row.reduce((sum, value) => sum + value * value, 0));
+  assert.ok(Math.abs(found[1] - 0.01 * variance) < 1e-8 && Math.abs(found[0] - 0.01) < 1e-8, found.join());
+  const left = cloud.opacities[0] / one.opacities[0];
+  assert.ok(Math.abs(left - 0.5 / Math.sqrt(variance)) < 1e-6, `${left}`);
   assert.ok(Math.abs(normalBelow(1) - 0.8413447460685429) < 1e-12);
 });

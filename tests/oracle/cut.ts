@@ -1,7 +1,9 @@
-/** Cuts, by their definition: a splat changes by the share of it that lies in a shape, whose surface counts as its tangent plane. */
+/**
+ * Cuts, by their definition: a splat changes by the share of it that lies in a shape, whose surface counts as its tangent plane. Of a splat that is hidden in part the rest is a Gaussian again.
+ */
 import { inverse, multiply, type GaussianCloud, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import type { SplatCut } from '@gaussian-splat/renderer/modifiers';
-import { rotationTimesScale, worldPosition } from './projection.js';
+import { rotationTimesScale, worldPosition, type ShearedCloud } from './projection.js';
 import { thinnedBy } from './thinned.js';
 
 const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
@@ -43,22 +45,103 @@ function slabsOf(shape: SplatCut['shape'], [x, y, z]: number[], rows: number[][]
   }
 }
 
-/** Share of splat `i` that a cut changes. */
-export function shareCut(cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4 = IDENTITY): number {
-  const { shape, shapeToWorld, side, edge = 0 } = cut;
+/** Density of the standard normal distribution, and its product with x: 0 far out. */
+const density = (x: number): number => Math.exp(-0.5 * x * x) / Math.sqrt(2 * Math.PI);
+const weighted = (x: number): number => (Number.isFinite(x) ? x * density(x) : 0);
+
+/** What lies between the limits of one coordinate of a shape: of a splat, softened by the edge. */
+interface Limits {
+  readonly share: number;
+  /** Root of the covariance, transposed, times the gradient. */
+  readonly spread: number[];
+  /** Limits in standard deviations of both, and the fraction of these that is the splat's own. */
+  readonly low: number;
+  readonly high: number;
+  readonly own: number;
+}
+
+/** Limits of splat `i` in each coordinate of a cut's shape. */
+function limitsOf(cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4): Limits[] {
+  const { shape, shapeToWorld, edge = 0 } = cut;
   const toShape = multiply(inverse(shapeToWorld), sceneToWorld);
   const rows = [0, 1, 2].map((k) => [...toShape.slice(4 * k, 4 * k + 3)]);
   const position = worldPosition(cloud, i);
   const at = rows.map((row, k) => dot(row, position) + toShape[4 * k + 3]);
   const axes = rotationTimesScale(cloud, i);
   const worldSize = Math.cbrt(Math.abs(determinant(sceneToWorld)));
-  const inside = slabsOf(shape, at, rows).reduce((share, slab) => {
-    if (edge === 'hard') return slab.at >= slab.low && slab.at <= slab.high ? share : 0;
+  return slabsOf(shape, at, rows).map((slab) => {
     const spread = [0, 1, 2].map((k) => dot(slab.gradient, [axes[0][k], axes[1][k], axes[2][k]]));
-    const deviation = Math.hypot(...spread, (edge / worldSize) * Math.hypot(...slab.gradient));
-    return share * (normalBelow((slab.high - slab.at) / deviation) - normalBelow((slab.low - slab.at) / deviation));
-  }, 1);
-  return side === 'outside' ? 1 - inside : inside;
+    const wide = edge === 'hard' ? 0 : (edge / worldSize) * Math.hypot(...slab.gradient);
+    const deviation = Math.hypot(...spread, wide);
+    const [low, high] = [(slab.low - slab.at) / deviation, (slab.high - slab.at) / deviation];
+    const own = Math.hypot(...spread) / deviation;
+    if (edge !== 'hard') return { share: normalBelow(high) - normalBelow(low), spread, low, high, own };
+    return { share: slab.at >= slab.low && slab.at <= slab.high ? 1 : 0, spread, low, high, own };
+  });
+}
+
+/** Share of splat `i` that a cut changes. */
+export function shareCut(cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4 = IDENTITY): number {
+  const inside = limitsOf(cloud, i, cut, sceneToWorld).reduce((product, { share }) => product * share, 1);
+  return cut.side === 'outside' ? 1 - inside : inside;
+}
+
+/** A splat that cuts have trimmed. */
+interface Trimmed {
+  readonly opacity: number;
+  readonly position: number[];
+  readonly axes: number[][];
+}
+
+/** The least of a variance that trimming keeps, and the least mass that is seen. */
+const [LEAST_VARIANCE, LEAST_MASS] = [0.01, 0.004];
+
+/**
+ * What a cut that hides leaves of a splat: the Gaussian whose mass, mean and variance along each coordinate of the shape are those of the splat times the opacity of the cut at each place,
+ * where the others of the coordinates count by their means.
+ */
+function trim(splat: Trimmed, cloud: GaussianCloud, i: number, cut: SplatCut, sceneToWorld: Matrix4): Trimmed {
+  const { opacity = 1, side, edge } = cut;
+  const limits = limitsOf(cloud, i, cut, sceneToWorld);
+  const inside = limits.reduce((product, { share }) => product * share, 1);
+  const share = side === 'outside' ? 1 - inside : inside;
+  const mass = 1 - (1 - opacity) * share;
+  if (edge === 'hard' || share <= 0 || share >= 1 || mass >= 1 || mass <= LEAST_MASS)
+    return { ...splat, opacity: splat.opacity * mass };
+  const [base, sign] = side === 'outside' ? [opacity, 1] : [1, -1];
+  const found = rotationTimesScale(cloud, i);
+  let { position, axes } = splat;
+  let narrowed = 1;
+  for (const each of limits) {
+    const weight = sign * (1 - opacity) * Math.min(inside / each.share, 1);
+    const mean = (weight * each.own * (density(each.low) - density(each.high))) / mass;
+    const inner = each.share + each.own ** 2 * (weighted(each.low) - weighted(each.high));
+    const kept = Math.min(1, Math.max(LEAST_VARIANCE, (base + weight * inner) / mass - mean * mean));
+    const size = Math.hypot(...each.spread);
+    position = position.map((value, row) => value + (mean * dot(found[row], each.spread)) / size);
+    // The gradient of the same coordinate, in the axes as they are by now: found · spread is the covariance times it.
+    const way = solved(found, each.spread);
+    const spread = [0, 1, 2].map((k) => dot(way, [axes[0][k], axes[1][k], axes[2][k]]));
+    const u = spread.map((value) => value / Math.hypot(...spread));
+    axes = axes.map((row) => {
+      const along = (1 - Math.sqrt(kept)) * dot(row, u);
+      return row.map((value, k) => value - along * u[k]);
+    });
+    narrowed *= Math.sqrt(kept);
+  }
+  return { opacity: splat.opacity * Math.min(1, mass / narrowed), position, axes };
+}
+
+/** The gradient g of which `spread` is axesᵀ · g, by Cramer's rule. */
+function solved(axes: number[][], spread: number[]): number[] {
+  const rows = [0, 1, 2].map((k) => [axes[0][k], axes[1][k], axes[2][k]]);
+  const det = (m: number[][]): number =>
+    m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+    m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+    m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+  return [0, 1, 2].map(
+    (column) => det(rows.map((row, r) => row.map((value, c) => (c === column ? spread[r] : value)))) / det(rows),
+  );
 }
 
 /** A cloud as cuts leave it, and the colors of its splats. */
@@ -66,25 +149,31 @@ export function cutCloud(
   cloud: GaussianCloud,
   cuts: readonly SplatCut[],
   sceneToWorld: Matrix4 = IDENTITY,
-): { cloud: GaussianCloud; recolor: (i: number, color: Vector3) => Vector3 } {
+): { cloud: ShearedCloud; recolor: (i: number, color: Vector3) => Vector3 } {
+  if (cuts.length === 0) return { cloud, recolor: (_, color) => color };
   const shares = Array.from({ length: cloud.count }, (_, i) =>
     cuts.map((cut) => shareCut(cloud, i, cut, sceneToWorld)),
   );
   const toScene = inverse(sceneToWorld);
-  const opacities = cloud.opacities.map((own, i) =>
-    cuts.reduce((left, { opacity = 1, surfaceOpacity = 1 }, k) => {
-      const share = shares[i][k];
-      const factor = Math.min(1, Math.log(1 - surfaceOpacity) / Math.log(1e-4));
-      return thinnedBy(left * (1 + share * (opacity - 1)), 1 + share * (factor - 1));
-    }, own),
+  const trimmed = shares.map((own, i) =>
+    cuts.reduce<Trimmed>(
+      (from, cut, k) => {
+        const { surfaceOpacity = 1, offset = [0, 0, 0] } = cut;
+        const splat = trim(from, cloud, i, cut, sceneToWorld);
+        const factor = Math.min(1, Math.log(1 - surfaceOpacity) / Math.log(1e-4));
+        const moved = [0, 1, 2].map((row) => own[k] * dot([...toScene.slice(4 * row, 4 * row + 3)], offset));
+        const position = splat.position.map((value, row) => value + moved[row]);
+        return { ...splat, position, opacity: thinnedBy(splat.opacity, 1 + own[k] * (factor - 1)) };
+      },
+      {
+        opacity: cloud.opacities[i],
+        position: [...cloud.positions.subarray(3 * i, 3 * i + 3)],
+        axes: rotationTimesScale(cloud, i),
+      },
+    ),
   );
-  const positions = cloud.positions.map((own, j) => {
-    const [i, axis] = [Math.floor(j / 3), j % 3];
-    return cuts.reduce((sum, { offset = [0, 0, 0] }, k) => {
-      const moved = [0, 1, 2].reduce((total, m) => total + toScene[4 * axis + m] * offset[m], 0);
-      return sum + shares[i][k] * moved;
-    }, own);
-  });
+  const opacities = Float32Array.from(trimmed, ({ opacity }) => opacity);
+  const positions = Float32Array.from(trimmed.flatMap(({ position }) => position));
   const recolor = (i: number, color: Vector3): Vector3 => {
     const mapped = cuts.reduce<Vector3>((from, { color: map }, k) => {
       if (map === undefined) return from;
@@ -93,7 +182,7 @@ export function cutCloud(
     }, color);
     return mapped.map((channel) => Math.max(0, channel)) as unknown as Vector3;
   };
-  return { cloud: { ...cloud, opacities, positions }, recolor };
+  return { cloud: { ...cloud, opacities, positions, axes: trimmed.map(({ axes }) => axes) }, recolor };
 }
 
 const dot = (a: readonly number[], b: readonly number[]): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

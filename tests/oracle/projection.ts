@@ -87,8 +87,15 @@ export function jacobian(camera: Camera, [x, y, z]: Vector3, rules: Rules): [num
   ];
 }
 
+/** A cloud whose covariances may be those of matrices in place of rotations and scales. */
+export interface ShearedCloud extends GaussianCloud {
+  /** 3x3 for each splat, as {@link rotationTimesScale} returns it. */
+  readonly axes?: readonly number[][][];
+}
+
 /** R·S, so that the covariance is (R·S)(R·S)ᵀ: the rotation of the quaternion (w, x, y, z), columns scaled. */
-export function rotationTimesScale(cloud: GaussianCloud, i: number): number[][] {
+export function rotationTimesScale(cloud: ShearedCloud, i: number): number[][] {
+  if (cloud.axes) return cloud.axes[i];
   const q = cloud.rotations.subarray(4 * i, 4 * i + 4);
   const norm = Math.hypot(q[0], q[1], q[2], q[3]);
   const [w, x, y, z] = [q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm];

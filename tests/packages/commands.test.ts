@@ -16,6 +16,7 @@ import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
+import { PNG } from 'pngjs';
 import { gpuEnvironment } from '../../scripts/lib/gpu-environment.mjs';
 import { buildGltf } from '../formats/support/gltf-writer.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
@@ -197,6 +198,52 @@ test('gaussian-splat render says in a sentence what it was asked wrongly', () =>
   ];
   for (const [sentence, scene, camera, out] of someOf(wrong, 2)) {
     const { status, text } = command('render', scene, '--camera', camera, '--view', '0', '--out', out);
+    assert.notEqual(status, 0, text);
+    assert.match(text, sentence);
+    assert.doesNotMatch(text, /\n\s+at /, 'no stack');
+  }
+});
+
+const hasFfmpeg = spawnSync('ffmpeg', ['-version']).error === undefined;
+
+test('gaussian-splat video writes numbered frames of a turntable, with their alpha', () => {
+  const turn = ['--turntable', '--size', '16x12', '--frames', '3'];
+  const { status, text } = command('video', 'gltf/scene.gltf', ...turn, '--out', 'frames');
+  assert.equal(status, 0, text);
+  assert.match(text, /^frames: 3 frames of 16x12, 0\.1 s; 6 splats/m);
+  const names = readdirSync(inFolder('frames')).sort();
+  assert.deepEqual(names, ['frame-0000.png', 'frame-0001.png', 'frame-0002.png']);
+  const frames = names.map((name) => PNG.sync.read(readFileSync(inFolder('frames', name))));
+  assert.ok(frames.every(({ width, height }) => width === 16 && height === 12));
+  assert.equal(frames[0].data[3], 0, 'a corner is transparent');
+  assert.notDeepEqual(frames[0].data, frames[1].data, 'the camera moves');
+});
+
+test('gaussian-splat video writes WebM by ffmpeg', { skip: !hasFfmpeg && 'no ffmpeg here' }, () => {
+  const turn = ['--turntable', '--size', '16x12', '--frames', '3'];
+  const { status, text } = command('video', 'gltf/scene.gltf', ...turn, '--out', 'turn.webm');
+  assert.equal(status, 0, text);
+  // The number of EBML, which WebM begins with.
+  assert.equal(readFileSync(inFolder('turn.webm')).readUInt32BE(0), 0x1a45dfa3);
+  assert.deepEqual(
+    readdirSync(folder).filter((name) => name.includes('.part')),
+    [],
+    'no half file stays',
+  );
+});
+
+test('gaussian-splat video says in a sentence what it was asked wrongly', () => {
+  writeFileSync(inFolder('no-views.json'), '{"views": 5}');
+  const wrong: readonly [RegExp, ...string[]][] = [
+    [/expected either --path or --turntable/, '--out', 'a'],
+    [/--frames: expected a whole number from 1/, '--turntable', '--out', 'a', '--frames', '0.5'],
+    [/expected a list of views/, '--path', 'no-views.json', '--out', 'a'],
+    [/--size: expected two sides/, '--turntable', '--out', 'a', '--size', '0x5'],
+    [/expected a folder, or a file that ends in \.mp4 or \.webm/, '--turntable', '--out', 'camera.json'],
+    [/--out: expected even sides for \.mp4, found 15x12/, '--turntable', '--out', 'a.mp4', '--size', '15x12'],
+  ];
+  for (const [sentence, ...args] of someOf(wrong, 3)) {
+    const { status, text } = command('video', 'gltf/scene.gltf', ...args);
     assert.notEqual(status, 0, text);
     assert.match(text, sentence);
     assert.doesNotMatch(text, /\n\s+at /, 'no stack');

@@ -2,6 +2,7 @@
 /** `gaussian-splat COMMAND ...`: each command is a module of src/, which reads the arguments after its name. */
 const COMMANDS = {
   render: 'one frame of a scene as PNG or float32, without a browser',
+  video: 'a camera path or a turntable as PNG files, mp4 or webm, without a browser',
   page: 'a folder with a page that shows a scene, for any static host',
   detail: 'a scene as a folder that is streamed from static hosting',
   economise: 'a smaller scene that keeps to a figure in dB',

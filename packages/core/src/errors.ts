@@ -58,6 +58,8 @@ export type ErrorCode =
   /** A caller's argument violates the documented contract of a function. */
   | 'argument/camera'
   | 'argument/cloud'
+  /** A scene has more cuts than one scene can have. */
+  | 'argument/splat-cut'
   /** A page's hook for splats is not WGSL that compiles. */
   | 'argument/splat-shader'
   /** A method was called outside of a user activation. */

@@ -194,6 +194,11 @@ export const ATTRIBUTES = {
    */
   fieldOfView: read(fieldOfViewGrammar),
   /**
+   * Shows the scene by parallel rays, as plans do: nothing gets smaller with its distance. Zooming scales the image.
+   * @example orthographic
+   */
+  orthographic: flag(),
+  /**
    * Named views that visitors can choose from. Either JSON (as a property, a list), `[{ name, orbit, target, fieldOfView }]`, or the URL of such a file,
    * of `cameras.json` of a trainer, or of the settings of SuperSplat. Children with `data-orbit` are views, too.
    * @example views='[{ "name": "Front", "orbit": "0deg 75deg 100%" }]'
@@ -318,6 +323,12 @@ export const ATTRIBUTES = {
    */
   iosSrc: text(),
   /**
+   * URL of an equirectangular image (JPEG, PNG, WebP or AVIF) that surrounds the scene. Its middle lies at +x, as in `<model-viewer>`. It is in saved images and videos, and not in VR and AR.
+   * @default none
+   * @example skybox-image="meadow.jpg"
+   */
+  skyboxImage: text(),
+  /**
    * Darkness of the shadow on the ground under the scene, 0 to 1. It is computed from the splats and meshes once, and
    * again when they change.
    * @default `0`: none. AR has one of `1`
@@ -376,8 +387,8 @@ export const ATTRIBUTES = {
    * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-walk`, `keys-views`; `views`, `next-view`, `previous-view`;
    * `vr`, `ar`, `exit-ar`, `ar-simplified`, `measure`, `measure-keys`, `measure-none`;
    * `show` (`…` stands for `alt`), `loading`, `blocked`, `reset`, `pause`, `play`, `details`; and `error-` before each `error.code`. Without it the words are
-   * English, and marked as English.
-   * @default English
+   * those of the language that `lang` names: English, German, Spanish, French, Japanese, Korean, Portuguese, Russian or Chinese.
+   * @default by `lang`
    * @example a11y='{ "pause": "Anhalten", "play": "Abspielen" }'
    */
   a11y: text<SpokenStrings | string | null>(),
@@ -554,6 +565,7 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
       minFieldOfView: values.minFieldOfView,
       maxFieldOfView: values.maxFieldOfView,
       up: values.up,
+      orthographic: values.orthographic,
     },
   };
 }

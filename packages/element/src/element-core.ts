@@ -54,6 +54,8 @@ export class ElementCore
   readonly size: SizeController;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   drawnFrom: Camera | undefined;
+  /** Called after each frame, in the task that has drawn it. */
+  declare onFrame: (() => void) | undefined;
   readonly view: ViewController;
   readonly hasOwnClock = true;
   readonly #host: ElementHost;
@@ -92,7 +94,7 @@ export class ElementCore
     },
     this.#update,
   );
-  /** VR, AR, the ruler and the shadow. */
+  /** VR, AR, the ruler, the shadow and the sky. */
   readonly extras = new Lazy(
     'the code for VR, AR and measuring',
     async () => new (await import('./xr/extras.js')).Extras(this.element, this),
@@ -400,7 +402,7 @@ export class ElementCore
   }
 
   drawBeneath(frame: Frame): Partial<FrameTarget> {
-    return this.sources.meshes.value?.draw(frame) ?? {};
+    return { ...this.extras.value?.sky.value?.draw(frame), ...this.sources.meshes.value?.draw(frame) };
   }
 
   /** Reads surface positions of the last frame. Rejects if the frame is gone. */
@@ -427,6 +429,7 @@ export class ElementCore
   afterFrame(camera: Camera): void {
     this.drawnFrom = camera;
     this.labels.value?.frameDrawn(camera);
+    this.onFrame?.();
   }
 
   cameraChanged(source: CameraChangeSource): void {
@@ -521,9 +524,9 @@ export class ElementCore
     if (!this.sources.ownEntry.isLeaving) this.playback.keepScene();
     if (this.attributes.views) this.tour.want(this.#warnOf);
     if (this.attributes.navigation === 'walk') this.walk.want(this.#warnOf);
-    const { vr, ar, measure, shadowIntensity, revealEffect } = this.attributes;
+    const { vr, ar, measure, shadowIntensity, skyboxImage, revealEffect } = this.attributes;
     if (revealEffect || this.source.splatShader) this.effects.want(this.#warnOf);
-    if (vr || ar || measure || shadowIntensity) this.extras.want(this.#warnOf);
+    if (vr || ar || measure || shadowIntensity || skyboxImage) this.extras.want(this.#warnOf);
     if (this.input.enabled) this.#hands.want(this.#warnOf);
     this.reveal.settle();
     this.sources.request();

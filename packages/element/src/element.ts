@@ -1,3 +1,4 @@
+import { loadModule } from '@gaussian-splat/core';
 import { isServer, type PropertyValues, type ReactiveElement, type TemplateResult } from 'lit';
 import { adoptStyles, styles } from './styles.js';
 import { readAttributes, type Attributes } from './attributes.js';
@@ -161,6 +162,9 @@ export class GaussianSplatElement extends ViewingMethods {
   readonly #internals: ElementInternals | null;
   #dynamicValues: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
   #strings: SpokenStrings = {};
+  /** Words in the language of the page. */
+  #words: SpokenStrings = {};
+  #lang = '';
   /** Camera attributes that the page has set since they were last applied. */
   readonly #set = new Set<keyof CameraSettings>();
   #controlObserver: MutationObserver | undefined;
@@ -237,7 +241,8 @@ export class GaussianSplatElement extends ViewingMethods {
     // The model defines the names of controls, so they cannot be listed in observedAttributes. Lit observes its own
     // properties.
     this.#controlObserver ??= new MutationObserver((records) => {
-      const counts = (name: string | null): boolean => name === 'aria-label' || !!name?.startsWith(CONTROL_PREFIX);
+      const counts = (name: string | null): boolean =>
+        name === 'aria-label' || name === 'lang' || !!name?.startsWith(CONTROL_PREFIX);
       if (!records.some(({ attributeName }) => counts(attributeName))) return;
       this.requestUpdate();
       this.core.requestFrame();
@@ -276,6 +281,8 @@ export class GaussianSplatElement extends ViewingMethods {
     this.applyAttributes();
     if (isServer) return;
     this.#readDynamicValues();
+    const { lang = '' } = (this.closest('[lang]') ?? this) as HTMLElement;
+    if (lang !== this.#lang) this.#speak((this.#lang = lang)).catch((error: Error) => this.#warn(error.message));
     if (changed.has('a11y')) this.#readStrings();
     if (changed.has('time')) this.#seekToAttribute();
   }
@@ -399,7 +406,18 @@ export class GaussianSplatElement extends ViewingMethods {
   #readStrings(): void {
     const strings = readSpokenStrings(this.a11y);
     if (strings === null) this.#warn('<gaussian-splat>: a11y expects a JSON object of words; the English ones count.');
-    this.#strings = strings ?? {};
+    this.#strings = { ...this.#words, ...strings };
+  }
+
+  /** Says everything in the language of the page, as soon as its words are there. */
+  async #speak(lang: string): Promise<void> {
+    const words = /^(en\b|$)/i.test(lang)
+      ? {}
+      : await loadModule('the words of this language', async () => (await import('./languages.js')).wordsIn(lang));
+    if (lang !== this.#lang) return;
+    this.#words = words;
+    this.#readStrings();
+    this.requestUpdate();
   }
 
   /** The attribute `time`; NaN if it is absent. */

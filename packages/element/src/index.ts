@@ -20,6 +20,7 @@ export { GaussianSplatElement } from './element.js';
 export type { SceneStats } from './stats.js';
 export type { DynamicQualityReport } from './controllers/dynamic-quality-controller.js';
 export type { SettableProperties } from './media.js';
+export type { FrameOptions, RecordOptions } from './recording.js';
 export type { ImageOptions } from './viewing.js';
 export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './views/camera-view.js';
 export type { Easing } from './views/path.js';

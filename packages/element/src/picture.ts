@@ -13,6 +13,8 @@ export interface PictureHost {
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
 }
 
+export { record, recordFrames } from './recording.js';
+
 /** Premultiplied, 0..1. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
 

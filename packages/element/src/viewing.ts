@@ -2,6 +2,8 @@ import { loadModule } from '@gaussian-splat/core';
 import type { CameraOrbit, CameraTarget, FieldOfView, PickedPoint } from './camera/values.js';
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
+import type * as pictures from './picture.js';
+import type { FrameOptions, RecordOptions } from './recording.js';
 import { boxOf, type SceneBox } from './scene-queries.js';
 import type { CameraView } from './views/camera-view.js';
 import type { FlightOptions, PathOptions } from './views/tour.js';
@@ -138,9 +140,30 @@ export abstract class ViewingMethods extends MediaProperties {
    * for a size that the GPU cannot draw, and with a `TypeError` for an invalid background color.
    */
   async toBlob(options: ImageOptions = {}): Promise<Blob> {
-    const { takePicture } = await loadModule('the code for images', () => import('./picture.js'));
+    return (await this.#images()).takePicture(this.core, options);
+  }
+
+  /**
+   * A video of what the element shows, recorded by the browser while it happens: of the camera's `path`, for a `duration`, or until the `signal`. The camera comes back afterwards.
+   * @returns rejects with an `InvalidStateError` where no scene is shown, with a `NotSupportedError` where the browser does not record this type, and with a `TypeError` without views
+   * to go along, without an end, and for a background that is no color.
+   */
+  async record(options: RecordOptions = {}): Promise<Blob> {
+    return (await this.#images()).record(this.core, options);
+  }
+
+  /**
+   * The same frame by frame, each drawn for its own time however long that takes: `for await (const image of element.recordFrames({ path: 'turntable' }))`. They are the frames of
+   * `gaussian-splat video`. A scene that moves goes on by a frame's time, and has to be in sight.
+   */
+  async *recordFrames(options: FrameOptions = {}): AsyncGenerator<Blob, void> {
+    yield* (await this.#images()).recordFrames(this.core, options);
+  }
+
+  async #images(): Promise<typeof pictures> {
+    const images = await loadModule('the code for images', () => import('./picture.js'));
     this.applyAttributes();
-    return takePicture(this.core, options);
+    return images;
   }
 
   /**

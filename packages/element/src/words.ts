@@ -30,28 +30,29 @@ export type MotionWord = 'pause' | 'play';
 /** Words of VR, AR and measuring, which few pages have. */
 export type ExtraWord = 'vr' | 'ar' | 'exit-ar' | 'ar-simplified' | 'measure' | 'measure-keys' | 'measure-none';
 
-/** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
-export type SpokenStrings = Readonly<
-  Partial<
-    Record<
-      | ViewName
-      | keyof typeof WORDS
-      | keyof typeof PANEL_WORDS
-      | `error-${ElementErrorCode}`
-      | ViewWord
-      | WalkWord
-      | HandWord
-      | MotionWord
-      | ExtraWord,
-      string
-    >
+/** All words of the element in one language; those for errors are sentences for visitors, by `element.error.code`. */
+export type Words = Readonly<
+  Record<
+    | ViewName
+    | keyof typeof WORDS
+    | keyof typeof PANEL_WORDS
+    | `error-${ElementErrorCode}`
+    | ViewWord
+    | WalkWord
+    | HandWord
+    | MotionWord
+    | ExtraWord,
+    string
   >
 >;
+
+/** Strings of a page, or of its language, in place of the English ones. */
+export type SpokenStrings = Partial<Words>;
 
 /** A word of the page, or the English one. */
 export const word = (strings: SpokenStrings, key: keyof typeof WORDS): string => strings[key] ?? WORDS[key];
 
-/** The language of the element's own words: a page that gives any gives them in its own language. */
+/** The language of the element's own words: those of a page, and of {@link Words}, are in the language of the page. */
 export const languageOf = (strings: SpokenStrings): 'en' | undefined =>
   Object.keys(strings).length === 0 ? 'en' : undefined;
 

@@ -27,6 +27,8 @@ export interface GeometryReading {
 export interface PlacementModifier {
   /** Holds the `Modifiers` of the placement. */
   readonly values: GPUBuffer;
+  /** Changes with what it does. */
+  readonly version: number;
   /** The shaders that read geometry of a kind and modify it. */
   reading(kind?: GeometryReading): GeometryReading;
 }

@@ -1,6 +1,8 @@
 /** What a page does to splats: `<splat-cut>`, `reveal-effect` and `splatShader`. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { emulateMedia } from '@web/test-runner-commands';
+import { violationsIn } from './support/axe.js';
 import {
   assert,
   assertEqual,
@@ -12,6 +14,7 @@ import {
   frames,
   nextEvent,
   showLoaded,
+  submits,
   until,
 } from './support/harness.js';
 import { comesToShow, isBlue, isGreen, isRed, screenOf, type Rgb, type Screen } from './support/screen.js';
@@ -194,6 +197,63 @@ it('functions of two elements that are compiled at the same time stay apart', as
   };
   assert(await comesToShow(elements[0], only(isRed)), 'the first is red');
   assert(await comesToShow(elements[1], only(isBlue)), 'the second is blue');
+});
+
+it('a cut acts on a clip in every frame', async () => {
+  const element = await showLoaded({ src: '/net/clip/ball.gsv' });
+  assert((await countOf(element, isRed)) > 0, 'red is seen');
+  const child = await cut(element, { shape: 'sphere', scale: '100' });
+  assertEqual(await countOf(element, isColored), 0, 'the first frame');
+  const seeked = nextEvent(element, 'seeked');
+  element.currentTime = 0.15;
+  await seeked;
+  assertEqual(await countOf(element, isColored), 0, 'the second');
+  child.remove();
+  assert(await comesToShow(element, (screen) => screen.middleOf(isGreen) !== null), 'without it the second is green');
+});
+
+it('more cuts than one scene can have are named in a warning', async () => {
+  const element = await showLoaded(VIEW);
+  for (let i = 0; i < 17; i++) element.append(document.createElement('splat-cut'));
+  await claimComing(/at most 16 cuts of one scene/);
+});
+
+it('what a shader moves has a pause button, stands still with reduced motion, and axe finds nothing', async () => {
+  const code =
+    'fn modify(splat: Splat, uniforms: Uniforms) -> Splat { var s = splat; s.position.y += 0.2 * sin(3.0 * uniforms.time); return s; }';
+  const buttonOf = (element: GaussianSplatElement): HTMLButtonElement | null =>
+    element.shadowRoot!.querySelector('[part~=pause-button]');
+  const element = await showLoaded({ ...VIEW, alt: 'A compass' });
+  element.splatShader = { code, animated: true };
+  await until(() => buttonOf(element)?.getAttribute('aria-label') === 'Stop the motion', 'a button that pauses');
+  assertEqual(await violationsIn(element), [], 'violations');
+  const moves = async (): Promise<boolean> => {
+    const before = submits;
+    await delay(300);
+    return submits > before;
+  };
+  assert(await moves(), 'it moves');
+  buttonOf(element)!.click();
+  await until(
+    () => buttonOf(element)?.getAttribute('aria-label') === 'Start the motion',
+    'the button of what stands still',
+  );
+  await atRest(element);
+  assert(!(await moves()), 'it stands still');
+  element.remove();
+  await emulateMedia({ reducedMotion: 'reduce' });
+  try {
+    const still = await showLoaded({ ...VIEW, alt: 'A compass', 'reveal-effect': 'grow 60s' });
+    await atRest(still);
+    const whole = await countOf(still, isColored);
+    assert(whole > 0, 'it is there at once');
+    still.splatShader = { code, animated: true };
+    await until(() => buttonOf(still)?.getAttribute('aria-label') === 'Start the motion', 'what would move waits');
+    await atRest(still);
+    assertEqual(await countOf(still, isColored), whole, 'it stands still');
+  } finally {
+    await emulateMedia({ reducedMotion: 'no-preference' });
+  }
 });
 
 it('WebGL 2 draws the scene without them, and says so', async () => {

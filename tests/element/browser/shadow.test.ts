@@ -89,6 +89,19 @@ describe('shadow-intensity', () => {
     assert(Math.abs(none - 200) < 3, `${none} without`);
   });
 
+  it('is of what cuts leave', async () => {
+    const element = await shown({ 'shadow-intensity': '1' });
+    await untilShadow(element);
+    const dark = await lightAt(element, 0.35, 0.35);
+    const cut = document.createElement('splat-cut');
+    cut.setAttribute('scale', '100');
+    element.append(cut);
+    const end = performance.now() + 30_000;
+    let light = dark;
+    while (light < 197 && performance.now() < end) light = await lightAt(element, 0.35, 0.35);
+    assert(light >= 197, `${light} under nothing, ${dark} before`);
+  });
+
   it('is cast by meshes, and nobody picks it', async () => {
     const element = await shown({ 'shadow-intensity': '1' });
     const box = document.createElement('splat-mesh');

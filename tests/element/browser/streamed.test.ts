@@ -92,6 +92,17 @@ describe('a streamed scene', () => {
     const all = (): number => requests.reduce((sum, name) => sum + folder.files.get(name)!.byteLength, 0);
     await until(() => bytes() === all(), 'all of them');
     assertEqual(own, [], 'what the page itself fetches');
+    const { left, top } = element.getBoundingClientRect();
+    const pick = (): Promise<unknown> => element.positionFromPoint(left + 60, top + 50);
+    assert((await pick()) !== null, 'something in the middle');
+    const cut = document.createElement('splat-cut');
+    cut.setAttribute('scale', '1000');
+    element.append(cut);
+    let found: unknown = true;
+    await until(() => {
+      void pick().then((point) => (found = point));
+      return found === null;
+    }, 'a cut that hides all of its pages');
     await close(element);
     stop();
   });

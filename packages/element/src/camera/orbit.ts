@@ -109,3 +109,17 @@ export function cameraOfPose(
     far: DEFAULT_FAR,
   };
 }
+
+/**
+ * The same view by parallel rays: as large at the target. The eye goes back until it has all of the scene before it.
+ * @param radius distance of the eye to the target
+ * @param reach distance from the target within which the scene lies
+ */
+export function parallelCamera(camera: Camera, radius: number, reach: number): Camera {
+  const { fx, fy, worldToCamera } = camera;
+  const back = Float64Array.from(worldToCamera);
+  back[11] += reach;
+  // Rounded up, for what depends on it to stay as it is while the camera moves.
+  const far = 2 ** Math.ceil(Math.log2(radius + 2 * reach));
+  return { ...camera, fx: fx / radius, fy: fy / radius, worldToCamera: back, far, orthographic: true };
+}

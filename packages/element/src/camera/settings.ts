@@ -17,6 +17,8 @@ export interface CameraSettings {
   readonly maxFieldOfView: AngleSetting;
   /** Unit vector that points up in scene coordinates; undefined for that of the scene, else -y. */
   readonly up: Vector3 | undefined;
+  /** Rays are parallel. */
+  readonly orthographic?: boolean;
 }
 
 /** Bounds of a scene, in its own coordinates. */

@@ -3,6 +3,7 @@ import {
   cameraOfPose,
   framingDistance,
   nearPlane,
+  parallelCamera,
   toViewer,
   type CameraPose,
   type ViewerFrame,
@@ -117,7 +118,12 @@ export class CameraController {
 
   /** The current pinhole camera for a frame of width x height pixels. */
   view(width: number, height: number): Camera {
-    return cameraOfPose(this.#camera.now, this.viewerFrame, width, height, nearPlane(this.#bounds));
+    const { now } = this.#camera;
+    const { min, max, center } = this.#bounds;
+    const camera = cameraOfPose(now, this.viewerFrame, width, height, nearPlane(this.#bounds));
+    if (!this.#settings.orthographic) return camera;
+    const away = subtract(toViewer(this.viewerFrame, center), [now.x, now.y, now.z]);
+    return parallelCamera(camera, now.radius, Math.hypot(...away) + Math.hypot(...subtract(max, min)));
   }
 
   /**

@@ -1,6 +1,7 @@
 /** Loaded if an element has a cut, a reveal effect or a shader. */
-import { multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import {
+  MOST_CUTS,
   SplatModifier,
   SplatProgram,
   type SplatChanges,
@@ -176,6 +177,7 @@ export class Effects implements Mover {
     const { grown = 1, share = 1, cuts = [] } = changes;
     const isChanged = cuts.length > 0 || grown < 1 || share < 1 || this.#shader !== null;
     let modifier = this.#modifiers.get(member);
+    if (cuts.length > MOST_CUTS) this.#host.warn(tooManyCuts(cuts.length));
     if (isChanged && scene.renderer === 'webgl') return this.#host.warn(NO_WEBGL);
     if (!isChanged || scene.drawn.pages.length === 0) {
       if (modifier) this.#forget(member, modifier);
@@ -279,6 +281,15 @@ export class Effects implements Mover {
     return this.#progress < 1;
   }
 }
+
+/** The first ones count: those of the scene, then those of the element, then the reveal. */
+const tooManyCuts = (found: number): string =>
+  new GaussianSplatError('argument/splat-cut', {
+    where: '<splat-cut>',
+    expected: `at most ${MOST_CUTS} cuts of one scene, a reveal by sweep included`,
+    found: `${found}, of which the last are left out`,
+    remedy: 'put cuts of one scene into its <splat-scene>, and hide what is not needed',
+  }).message;
 
 const NO_WEBGL =
   '<gaussian-splat>: WebGL 2 draws the scene without <splat-cut>, reveal-effect and splatShader, which need WebGPU.';

@@ -56,8 +56,8 @@ export class MeshLayer {
   readonly #glass = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
   readonly #resolve: MeshResolve;
   #depth: { readonly key: readonly unknown[]; readonly ofSplats: SceneDepth } | undefined;
-  /** Near plane of the last frame. */
-  #near = 1;
+  /** Of the last frame. */
+  #drawnFrom: Pick<Camera, 'near' | 'far' | 'orthographic'> = { near: 1, far: Infinity };
   readonly #shown = new Map<Model, Group>();
   readonly #environment: CubeRenderTarget;
   #size = '1 x 1';
@@ -117,7 +117,7 @@ export class MeshLayer {
     const size = `${width} x ${height}`;
     if (size !== this.#size) for (const target of [this.#target, this.#glass]) target.setSize(width, height);
     this.#size = size;
-    this.#near = camera.near;
+    this.#drawnFrom = camera;
     const opaque = this.#drawKind(OPAQUE, this.#target);
     const hasGlass = models.some(({ model }) => (model as Model).materials.some(({ transparent }) => transparent));
     const glass = hasGlass ? this.#drawKind(TRANSPARENT, this.#glass) : undefined;
@@ -140,10 +140,12 @@ export class MeshLayer {
   async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
     const { width = 0, height = 0 } = this.#resolve.depth ?? {};
     const within = (at: number, size: number): number => Math.min(size - 1, Math.max(0, Math.floor(at)));
-    const nearPlane = this.#near;
+    const { near: nearPlane, far, orthographic } = this.#drawnFrom;
+    const depthOf = (value: number): number =>
+      orthographic ? (value > 0 ? far - value * (far - nearPlane) : Infinity) : nearPlane / value;
     const stored = await this.#resolve.read(points.map(({ x, y }) => [within(x, width), within(y, height)]));
     return answers.map((answer, i) => {
-      const mesh = nearPlane / stored[i];
+      const mesh = depthOf(stored[i]);
       const { depth: asked } = points[i];
       if (asked !== undefined) return mesh < asked ? { ...answer, transmittance: 0 } : answer;
       if (mesh >= (answer.depth ?? Infinity)) return { ...answer, far: Math.min(answer.far ?? mesh, mesh) };
@@ -180,13 +182,12 @@ export class MeshLayer {
 
   /** Bound once for the same textures. @param out receives the depth of the splats */
   #depthFor(opaque: Drawn, second: Drawn | undefined, out: GPUTexture | undefined): SceneDepth {
-    const key = [opaque.color, opaque.texture, second?.color, second?.texture, out];
+    const { orthographic } = this.#drawnFrom;
+    const far = orthographic ? this.#drawnFrom.far : Infinity;
+    const key = [opaque.color, opaque.texture, second?.color, second?.texture, out, far];
     if (!this.#depth?.key.every((value, i) => value === key[i])) {
       this.#depth?.ofSplats.destroy();
-      const ofSplats = new SceneDepth(this.device, {
-        host: { ...opaque, second, reversed: true, far: Infinity },
-        out,
-      });
+      const ofSplats = new SceneDepth(this.device, { host: { ...opaque, second, reversed: true, far }, out });
       this.#depth = { key, ofSplats };
     }
     return this.#depth.ofSplats;
@@ -230,19 +231,24 @@ export class MeshLayer {
     for (const material of model.materials) light(material, this.#environment.texture);
   }
 
-  #look({ width, height, fx, fy, cx, cy, near, worldToCamera }: Camera, world: ViewerFrame): void {
+  #look(camera: Camera, world: ViewerFrame): void {
+    const { width, height, fx, fy, cx, cy, near, far, worldToCamera, orthographic } = camera;
     const toScene = transposed(matrixOfFrame(world));
     const view = multiply(GL_AXES, multiply(worldToCamera, toScene));
     this.#camera.matrixWorldInverse.fromArray(transposed(view));
     this.#camera.matrixWorld.copy(this.#camera.matrixWorldInverse).invert();
     this.#camera.matrix.copy(this.#camera.matrixWorld);
-    // Depth is near / z: 1 at the near plane, 0 at infinity.
-    const projection = [
-      ...[(2 * fx) / width, 0, 1 - (2 * cx) / width, 0],
-      ...[0, (2 * fy) / height, (2 * cy) / height - 1, 0],
-      ...[0, 0, 0, near],
-      ...[0, 0, -1, 0],
-    ];
+    const [scaleX, scaleY] = [(2 * fx) / width, (2 * fy) / height];
+    const [offsetX, offsetY] = [1 - (2 * cx) / width, (2 * cy) / height - 1];
+    // Depth is near / z: 1 at the near plane, 0 at infinity; with parallel rays it falls linearly to 0 at the far plane.
+    const projection = orthographic
+      ? [
+          ...[scaleX, 0, 0, -offsetX],
+          ...[0, scaleY, 0, -offsetY],
+          ...[0, 0, 1 / (far - near), far / (far - near)],
+          ...[0, 0, 0, 1],
+        ]
+      : [...[scaleX, 0, offsetX, 0], ...[0, scaleY, offsetY, 0], ...[0, 0, 0, near], ...[0, 0, -1, 0]];
     this.#camera.projectionMatrix.fromArray(transposed(projection));
     this.#camera.projectionMatrixInverse.copy(this.#camera.projectionMatrix).invert();
   }

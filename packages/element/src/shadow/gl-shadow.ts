@@ -25,9 +25,9 @@ export function glTaker(backend: WebGlBackend): Taker {
       renderer.render({ camera: placed, shDegree: 0, accumulation: 'rgba16float', resolutionScale: 1 });
       renderer.present(undefined, { keeps: true });
     };
-    backend.beneath = beneath;
+    backend.beneath.shadow = beneath;
     const remove = (): void => {
-      if (backend.beneath === beneath) backend.beneath = undefined;
+      if (backend.beneath.shadow === beneath) backend.beneath.shadow = undefined;
       renderer.destroy();
       gaussians.destroy();
     };

@@ -97,11 +97,19 @@ export class ShadowController implements ReactiveController, Mover {
     const { backend } = view;
     if (this.#shown && this.#shown.context !== backend?.place.context) this.#remove();
     if (!backend || backend.isLost || isImmersed) return false;
-    const key = this.#contentKey();
-    if (key === '') this.#remove();
-    else if (key !== this.#key && !this.#isBusy) this.#renew(backend, key, now);
+    // This very frame may cut splats, or place them elsewhere.
+    queueMicrotask(() => this.#follow(backend, now));
     this.#fade();
     return false;
+  }
+
+  #follow(backend: Backend, now: number): void {
+    if (backend.isLost || backend.isDestroyed) return;
+    const key = this.#contentKey();
+    if (key === '') {
+      if (this.#shown) this.#core.requestFrame();
+      this.#remove();
+    } else if (key !== this.#key && !this.#isBusy) this.#renew(backend, key, now);
   }
 
   /** Changes whenever the shadow would; empty without a shadow. */
@@ -109,9 +117,9 @@ export class ShadowController implements ReactiveController, Mover {
     const { sources } = this.#core;
     const { intensity, softness } = readShadow(this.#core);
     if (intensity === 0 || sources.members.length === 0 || sources.isPreview) return '';
-    const places = sources.members.map(({ placement: { scene, sceneToWorld, visible, crop, opacity } }) => {
+    const places = sources.members.map(({ placement: { scene, sceneToWorld, visible, crop, opacity, modifier } }) => {
       const place = sceneToWorld ? Array.from(sceneToWorld).join() : '';
-      return `${scene.count} ${scene.version} ${place} ${visible} ${crop ? [crop.min, crop.max].join() : ''} ${opacity}`;
+      return `${scene.count} ${scene.version} ${place} ${visible} ${crop ? [crop.min, crop.max].join() : ''} ${opacity} ${modifier?.version}`;
     });
     return [...places, sources.meshes.value?.version, intensity, softness].join('|');
   }
@@ -149,9 +157,9 @@ export class ShadowController implements ReactiveController, Mover {
     const taker = await this.#taker(backend);
     try {
       const map = await takeShadow({ center: toViewer(frame, center), radius, frame }, taker.take);
-      if (map === null || backend.isLost || backend.isDestroyed) return this.#remove();
+      if (map === null || backend.isLost || backend.isDestroyed) return this.#clear();
       const rows = shadowSplats(map, intensity, softness);
-      if (rows.length === 0) return this.#remove();
+      if (rows.length === 0) return this.#clear();
       const packed = await packSplats(rows, services.sceneLoader, scene.signal);
       const shown = await taker.show(packed, map, worldOf(map, frame));
       this.#shown?.remove();
@@ -197,6 +205,11 @@ export class ShadowController implements ReactiveController, Mover {
 
   #remove(): void {
     this.#key = '';
+    this.#clear();
+  }
+
+  /** No shadow until the content changes. */
+  #clear(): void {
     this.#shown?.remove();
     this.#shown = undefined;
   }

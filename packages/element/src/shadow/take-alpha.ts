@@ -27,8 +27,8 @@ export function alphaOfWorld({ device, members, settings, filter, drawBeneath }:
 } {
   const world = new World();
   for (const { placement } of members) {
-    const { scene, sceneToWorld, opacity, crop, visible } = placement;
-    world.add({ scene: asItIs(scene), sceneToWorld, opacity, crop, visible });
+    const { scene, sceneToWorld, opacity, crop, visible, modifier } = placement;
+    world.add({ scene: asItIs(scene), sceneToWorld, opacity, crop, visible, modifier });
   }
   const viewpoint = new Viewpoint(device, world, { settings: { ...settings, shDegree: 0 } });
   return {

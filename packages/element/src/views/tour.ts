@@ -10,7 +10,8 @@ import type { GaussianSplatEventMap } from '../events.js';
 import { languageOf, type SpokenStrings, type ViewWord } from '../words.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';
 import { Flight } from './flight.js';
-import { easingOf, pathThrough, unwound, type Easing, type Path } from './path.js';
+import { pathOfList, turntable, type CameraPath, type PathName } from './camera-path.js';
+import { easingOf, pathThrough, unwound, type Easing } from './path.js';
 import { readViews, type NamedView, type ViewList } from './read-views.js';
 
 /** Options of a flight. */
@@ -29,6 +30,8 @@ export interface PathOptions {
   readonly easing?: Easing;
   /** Restarts at the end, until a visitor takes over the camera. */
   readonly loop?: boolean;
+  /** Default `views`: the list. `turntable`: once around the target, in 8 s. */
+  readonly path?: PathName;
 }
 
 export interface TourHost {
@@ -47,7 +50,6 @@ export interface TourHost {
 }
 
 const DURATION_MS = 1_200;
-const PART_MS = 3_000;
 
 const WORDS: Readonly<Record<ViewWord, string>> = {
   views: 'Views',
@@ -148,8 +150,8 @@ export class Tour implements ReactiveController, Mover {
     return this.flyTo((from + by + views.length) % views.length, options);
   }
 
-  async flyAlong({ duration, easing = 'linear', loop = false }: PathOptions = {}): Promise<boolean> {
-    const path = await this.#path();
+  async flyAlong({ duration, easing = 'linear', loop = false, path: name }: PathOptions = {}): Promise<boolean> {
+    const path = await this.path(name);
     if (path === null) return false;
     const length = duration ?? path.seconds * 1_000;
     const ease = easingOf(easing);
@@ -160,7 +162,7 @@ export class Tour implements ReactiveController, Mover {
   }
 
   async showAlong(share: number): Promise<void> {
-    const path = await this.#path();
+    const path = await this.path();
     if (path === null) return;
     this.#flight?.cancel();
     this.#of.camera.moveTo(path.at(Math.min(1, Math.max(0, share))));
@@ -175,31 +177,18 @@ export class Tour implements ReactiveController, Mover {
     return { views: this.#views, path };
   }
 
-  async #path(): Promise<{ at: (share: number) => CameraPose; seconds: number } | null> {
-    const { views, path } = await this.#ready();
-    const stops = path.length > 0 ? path : views.map(({ view }, i) => ({ time: (i * PART_MS) / 1_000, view }));
-    if (stops.length === 0) return null;
-    const times = stops.map(({ time }) => time);
-    const [first, seconds] = [times[0], times[times.length - 1] - times[0]];
-    const along = this.#along(path.length > 0 ? path : views, stops, times);
-    return { at: (share) => along(first + share * seconds), seconds };
-  }
-
   /** The last computed path is cached: a page that scrolls asks for it in every frame. */
-  #known: { readonly list: unknown; readonly context: string; readonly path: Path } | undefined;
+  #known: { readonly list: ViewList; readonly place: string; readonly path: CameraPath | null } | undefined;
 
-  #along(list: unknown, stops: ViewList['path'], times: readonly number[]): Path {
-    const { context } = this.#of.camera;
-    // The current camera is left out of the key, which would otherwise change at each step.
-    const key = JSON.stringify({ ...context, from: undefined });
-    const known = this.#known;
-    if (known && known.list === list && known.context === key) return known.path;
-    const path = pathThrough(
-      stops.map(({ view }) => poseOfView(view, context)),
-      times,
-    );
-    this.#known = { list, context: key, path };
-    return path;
+  /** @param aspect width / height of the frames; default: of the element */
+  async path(name: PathName = 'views', aspect = this.#of.camera.context.aspect): Promise<CameraPath | null> {
+    const list = await this.#ready();
+    const { from, ...context } = this.#of.camera.context;
+    if (name === 'turntable') return turntable(from);
+    const place = JSON.stringify({ ...context, aspect });
+    if (!this.#known || this.#known.place !== place || !isSameList(this.#known.list, list))
+      this.#known = { list, place, path: pathOfList(list, { ...context, aspect }) };
+    return this.#known.path;
   }
 
   #fly(
@@ -345,6 +334,10 @@ export class Tour implements ReactiveController, Mover {
 
 /** Maximum size of a views file, bytes: it is parsed on the main thread. */
 const MAX_VIEWS = 2 ** 22;
+
+/** Views of children are read anew each time. */
+const isSameList = (a: ViewList, b: ViewList): boolean =>
+  a.path === b.path && a.views.length === b.views.length && a.views.every(({ view }, i) => view === b.views[i].view);
 
 const NO_VIEWS: ViewList = { views: [], path: [] };
 

@@ -29,6 +29,8 @@ const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
 /** Minimum fraction of a full frame's time that is proportional to pixels. */
 const SURE_SHARE = 0.5;
 
+type Beneath = (camera: Camera) => void;
+
 /** A canvas with copies of the images that the page's context draws. */
 interface CopySurface extends Surface {
   readonly context: CanvasRenderingContext2D;
@@ -39,8 +41,8 @@ export class WebGlBackend implements Backend {
   readonly filter = undefined;
   readonly isPrepared = true;
   readonly scene: GlLoaded;
-  /** Draws meshes and shadows beneath the splats, into the context's canvas. */
-  beneath: ((camera: Camera) => void) | undefined;
+  /** Draw the sky and the shadow beneath the splats, in this order, into the context's canvas. */
+  readonly beneath: { sky?: Beneath | undefined; shadow?: Beneath | undefined } = {};
   readonly #sorter: DepthSorter;
   readonly #overdraw = new OverdrawLimit();
   /** The view of the order on the GPU. */
@@ -221,11 +223,13 @@ export class WebGlBackend implements Backend {
     const { context } = surface as CopySurface;
     const { lease } = this.scene;
     lease.fit(width, height);
-    if (this.beneath) {
+    const { sky, shadow } = this.beneath;
+    if (sky || shadow) {
       const { gl } = lease;
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
       gl.clearBufferfv(gl.COLOR, 0, background ?? [0, 0, 0, 0]);
-      this.beneath(camera);
+      sky?.(camera);
+      shadow?.(camera);
       this.scene.frames.present(undefined, { keeps: true });
     } else this.scene.frames.present(background);
     const { canvas } = lease.gl;

@@ -1,7 +1,8 @@
-/** Code for the attributes `vr`, `ar`, `measure` and `shadow-intensity`, loaded if one of them is set. */
+/** Code for the attributes `vr`, `ar`, `measure`, `shadow-intensity` and `skybox-image`, loaded if one of them is set. */
 import { css, type ReactiveControllerHost } from 'lit';
 import { Lazy } from '../lazy.js';
 import type { ShadowHost } from '../shadow/shadow-controller.js';
+import type { Sky, SkyHost } from '../sky/sky.js';
 import type { XrHost } from './xr-host.js';
 import { adoptStyles } from '../styles.js';
 import type { XrOffer } from './xr-offer.js';
@@ -38,8 +39,9 @@ export class Extras {
   readonly ar: Lazy<XrOffer>;
   readonly measure: Lazy<unknown>;
   readonly shadow: Lazy<unknown>;
+  readonly sky: Lazy<Sky>;
 
-  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost & ShadowHost) {
+  constructor(element: ReactiveControllerHost & HTMLElement, core: XrHost & ShadowHost & SkyHost) {
     adoptStyles(element.shadowRoot!, STYLES);
     const place = element.ownerDocument.createElement('div');
     place.className = 'extras';
@@ -73,9 +75,11 @@ export class Extras {
       const { ShadowController } = await import('../shadow/shadow-controller.js');
       return new ShadowController(core);
     });
+    this.sky = new Lazy('the code for skies', async () => new (await import('../sky/sky.js')).Sky(core), update);
     const warn = ({ message }: Error): void => core.warn(message);
     const find = ({ attributes }: XrHost): void => {
       if (attributes.shadowIntensity) this.shadow.want(warn);
+      if (attributes.skyboxImage) this.sky.want(warn);
       if (attributes.vr) this.vr.want(warn);
       if (attributes.ar) this.ar.want(warn);
       if (attributes.measure) this.measure.want(warn);

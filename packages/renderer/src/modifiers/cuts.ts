@@ -10,7 +10,10 @@ export const CUT_SHAPES = ['box', 'sphere', 'cylinder', 'plane'] as const;
 /** A unit cube, or a sphere or a cylinder (axis y) of diameter and height 1, about the origin; or all that lies below the plane y = 0. */
 export type CutShape = (typeof CUT_SHAPES)[number];
 
-/** Changes splats in a region of space. A splat at its edge changes by the fraction that lies inside. */
+/**
+ * Changes splats in a region of space. A splat at its edge changes by the fraction that lies inside. A splat that is
+ * hidden in part is trimmed: the rest becomes the Gaussian of its mass, mean and variance.
+ */
 export interface SplatCut {
   readonly shape: CutShape;
   /** Row-major 4x4, last row (0, 0, 0, 1): from shape coordinates to world coordinates. */

@@ -36,6 +36,8 @@ const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 export class SplatModifier implements PlacementModifier {
   readonly values: GPUBuffer;
   readonly program: SplatProgram;
+  /** Changes with what it does. */
+  version = 0;
   readonly #device: GPUDevice;
   readonly #bytes = new ArrayBuffer(Modifiers.size);
   /** The last written values. */
@@ -87,6 +89,7 @@ export class SplatModifier implements PlacementModifier {
     const words = new Uint32Array(this.#bytes);
     if (words.every((word, k) => word === this.#written[k])) return false;
     this.#written.set(words);
+    this.version++;
     this.#device.queue.writeBuffer(this.values, 0, this.#bytes);
     return true;
   }

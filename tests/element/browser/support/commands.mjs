@@ -1,4 +1,10 @@
+import { execFile } from 'node:child_process';
+import { mkdtemp, readdir, readFile, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { setTimeout as delay } from 'node:timers/promises';
+import { promisify } from 'node:util';
+import { gpuEnvironment } from '../../../../scripts/lib/gpu-environment.mjs';
 
 /** What tests ask of the browser and cannot do from within a page: real touches, a real wheel, pictures of the screen. */
 export function pageCommands() {
@@ -56,7 +62,29 @@ const ACTIONS = {
     pictures.delete(page);
     return picture.toString('base64');
   },
+
+  /** Frames that `gaussian-splat video` writes with these arguments, as PNGs in base64, or `later` where they are still to come. */
+  'video-frames': async (page, args) => {
+    const key = JSON.stringify(args);
+    if (!videos.has(key)) videos.set(key, videoFrames(args));
+    return Promise.race([videos.get(key), delay(PATIENCE_MS, 'later')]);
+  },
 };
+
+const videos = new Map();
+
+async function videoFrames(args) {
+  const folder = await mkdtemp(join(tmpdir(), 'video-'));
+  const command = ['packages/cli/bin/gaussian-splat.mjs', 'video', ...args, '--out', folder];
+  const env = { ...process.env, ...gpuEnvironment(), INIT_CWD: process.cwd() };
+  try {
+    await promisify(execFile)(process.execPath, command, { env });
+    const names = (await readdir(folder)).sort();
+    return await Promise.all(names.map((name) => readFile(join(folder, name), 'base64')));
+  } finally {
+    await rm(folder, { recursive: true });
+  }
+}
 
 /** Pages are told within this, since their commands give up after 20 s: a GPU process that draws for another page takes its time. */
 const PATIENCE_MS = 10_000;

@@ -1,0 +1,106 @@
+/** What the commands that draw have in common: reading a scene, the renderer that draws it, and its images as files. */
+import { dirname, join, resolve } from 'node:path';
+import { PNG } from 'pngjs';
+import { SPLAT_FILTERS } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Viewpoint, World } from '@gaussian-splat/renderer';
+import { clipMoment, isClip } from './clip-frame.mjs';
+import { from, UsageError } from './command.mjs';
+import { readWhole } from './input-file.mjs';
+import { requestNodeAdapter } from './node-gpu.mjs';
+
+/** Options of how a scene is drawn, for `parseArgs`. */
+export const DRAW_OPTIONS = {
+  filter: { type: 'string' },
+  mode: { type: 'string' },
+  raster: { type: 'string', default: 'auto' },
+  accumulation: { type: 'string', default: 'auto' },
+  background: { type: 'string' },
+};
+
+/** Checks the values of {@link DRAW_OPTIONS}. @throws UsageError */
+export function readDrawOptions({ filter, mode, raster, accumulation, background }) {
+  const checked = { filter: filter ?? mode, raster, accumulation, background: readBackground(background) };
+  oneOf('--filter', checked.filter, [undefined, 'classic', 'antialiased', 'mip']);
+  oneOf('--raster', raster, ['auto', 'quads', 'tiles']);
+  oneOf('--accumulation', accumulation, ['auto', 'rgba16float', 'rgba32float']);
+  return checked;
+}
+
+function oneOf(name, value, allowed) {
+  if (allowed.includes(value)) return;
+  throw new UsageError(`${name}: expected ${allowed.filter(Boolean).join(' or ')}, found "${value}"`);
+}
+
+function readBackground(text) {
+  if (text === undefined) return [0, 0, 0, 0];
+  const channels = text.split(',').map(Number);
+  if (channels.length !== 3 || !channels.every((c) => c >= 0 && c <= 1)) {
+    throw new UsageError(`--background: expected three numbers in 0..1 such as 1,1,1, found "${text}"`);
+  }
+  return [...channels, 1];
+}
+
+/**
+ * Reads a scene. Its other files are in the folder of the named one.
+ * @param seconds time of the frame of a clip
+ */
+export async function readSceneFile(name, seconds = 0) {
+  const path = resolve(from, name);
+  if (isClip(name)) return clipMoment(await readWhole(path), name, seconds);
+  const openPart = (part) => readWhole(join(dirname(path), part));
+  return readScene(await readWhole(path), { name, openPart });
+}
+
+/**
+ * A renderer of one scene.
+ * @param options of {@link readDrawOptions}
+ * @returns `draw(camera)`: float32 premultiplied RGBA, row by row from the top. Rejects with the errors of WebGPU's validation.
+ */
+export async function openSceneRenderer(cloud, options) {
+  const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
+  const adapter = await requestNodeAdapter();
+  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  const validationErrors = [];
+  device.addEventListener('uncapturederror', ({ error }) => validationErrors.push(error.message));
+  const accumulation = chooseAccumulation(options.accumulation, device);
+  const world = new World();
+  const viewpoint = new Viewpoint(device, world, { settings: { rasterizer: options.raster, accumulation } });
+  const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased, filterVariance }));
+  world.add({ scene: gaussians });
+  return {
+    viewpoint,
+    accumulation,
+    mode: antialiased ? 'antialiased' : 'classic',
+    adapterName: adapter.info.description || adapter.info.vendor,
+    async draw(camera) {
+      const pixels = await capture(device, viewpoint, { camera, over: options.background });
+      if (validationErrors.length > 0) throw new Error(`WebGPU: ${validationErrors.join('\n')}`);
+      return pixels;
+    },
+  };
+}
+
+function chooseAccumulation(asked, device) {
+  if (asked !== 'auto') return asked;
+  return device.features.has('float32-blendable') ? 'rgba32float' : 'rgba16float';
+}
+
+/** 8-bit RGBA with straight alpha, rounded to nearest. */
+export function toBytes(pixels) {
+  const bytes = new Uint8Array(pixels.length);
+  const toByte = (value) => Math.round(255 * Math.min(1, Math.max(0, value)));
+  for (let i = 0; i < pixels.length; i += 4) {
+    const alpha = pixels[i + 3];
+    for (let k = 0; k < 3; k++) bytes[i + k] = toByte(alpha > 0 ? pixels[i + k] / alpha : 0);
+    bytes[i + 3] = toByte(alpha);
+  }
+  return bytes;
+}
+
+/** A PNG of {@link toBytes}. */
+export function encodePng(bytes, width, height) {
+  const png = new PNG({ width, height });
+  png.data.set(bytes);
+  return PNG.sync.write(png);
+}

@@ -1,0 +1,162 @@
+/** The work behind `gaussian-splat video`: frames along a camera path, as PNG files or as a video. */
+import { existsSync, mkdirSync, statSync } from 'node:fs';
+import { dirname, join, resolve } from 'node:path';
+import { boundsOf } from '@gaussian-splat/core';
+import { camerasAlong } from '@gaussian-splat/element/camera-path.js';
+import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
+import {
+  DRAW_OPTIONS,
+  encodePng,
+  openSceneRenderer,
+  readDrawOptions,
+  readSceneFile,
+  toBytes,
+} from './lib/draw-scene.mjs';
+import { checkVideo, isVideo, keepsAlpha, openVideo } from './lib/ffmpeg.mjs';
+import { readJson } from './lib/input-file.mjs';
+import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+
+const USAGE = `usage: gaussian-splat video SCENE (--path VIEWS.json | --turntable) --out FOLDER|FILE.mp4|FILE.webm [options]
+
+  --path FILE          what the attribute "views" of the element takes: a list of views, a cameras.json, or the
+                       settings of SuperSplat, whose keyframes count. The path is that of flyAlong()
+  --turntable          one turn around the target instead
+  --out PATH           a folder for frame-0000.png, frame-0001.png ... with straight alpha; or a video, for which
+                       ffmpeg must be installed: .webm keeps the alpha, .mp4 has none
+  --size WxH           pixels; default: 1280x720
+  --fps N              frames in a second; default: 30
+  --seconds N          length; default: what the path says, 8 for a turntable
+  --frames N           number of frames, in place of --seconds
+  --orbit, --target, --field-of-view, --up, --orthographic
+                       the attributes camera-orbit, camera-target, field-of-view, up and orthographic of the element
+  --background R,G,B   0..1; default: transparent, white for .mp4
+  --filter, --raster, --accumulation
+                       as those of "gaussian-splat render"
+`;
+
+/** Frames of one video. */
+const MOST_FRAMES = 100_000;
+/** Pixels of a side. */
+const MOST_PIXELS = 16_384;
+
+function parseOptions(args) {
+  const text = { type: 'string' };
+  const parsed = parseSceneOptions(args, {
+    ...{ path: text, turntable: { type: 'boolean' }, out: text, seconds: text, frames: text },
+    ...{ size: { ...text, default: '1280x720' }, fps: { ...text, default: '30' } },
+    ...{ orbit: text, target: text, 'field-of-view': text, up: text, orthographic: { type: 'boolean' } },
+    ...DRAW_OPTIONS,
+  });
+  if (parsed === undefined) return undefined;
+  const { values } = parsed;
+  if ((values.path === undefined) === (values.turntable !== true))
+    throw new UsageError('expected either --path or --turntable');
+  if (values.out === undefined) throw new UsageError('--out is missing');
+  if (values.frames !== undefined && values.seconds !== undefined)
+    throw new UsageError('expected either --seconds or --frames');
+  const [width, height] = readSize(values.size);
+  const drawing = readDrawOptions(values);
+  if (isVideo(values.out) && !keepsAlpha(values.out) && values.background === undefined)
+    drawing.background = [1, 1, 1, 1];
+  return {
+    scene: parsed.scene,
+    path: values.path,
+    out: values.out,
+    drawing,
+    ...{ width, height },
+    frameRate: readNumber('--fps', values.fps, 0.01, 1000),
+    seconds: readNumber('--seconds', values.seconds, 0, MOST_FRAMES),
+    frames: readNumber('--frames', values.frames, 1, MOST_FRAMES, true),
+    attributes: attributesOf(values),
+  };
+}
+
+function attributesOf({ orbit, target, 'field-of-view': fieldOfView, up, orthographic }) {
+  const all = { cameraOrbit: orbit, cameraTarget: target, fieldOfView, up, orthographic };
+  return Object.fromEntries(Object.entries(all).filter(([, value]) => value !== undefined));
+}
+
+function readSize(text) {
+  const sides = /^(\d+)x(\d+)$/.exec(text)?.slice(1).map(Number);
+  if (!sides?.every((side) => side >= 1 && side <= MOST_PIXELS))
+    throw new UsageError(`--size: expected two sides of 1 to ${MOST_PIXELS} pixels such as 1280x720, found "${text}"`);
+  return sides;
+}
+
+function readNumber(name, text, least, most, isWhole = false) {
+  if (text === undefined) return undefined;
+  const value = Number(text);
+  if (text.trim() === '' || !(value >= least && value <= most) || (isWhole && !Number.isInteger(value)))
+    throw new UsageError(
+      `${name}: expected a ${isWhole ? 'whole ' : ''}number from ${least} to ${most}, found "${text}"`,
+    );
+  return value;
+}
+
+function readViews(path) {
+  try {
+    return readJson(resolve(from, path));
+  } catch (error) {
+    throw new UsageError(`--path: cannot read ${path} as JSON: ${error.message}`);
+  }
+}
+
+/** Everything that can be said of files before the work. */
+function checkFiles({ scene, path, out, width, height }) {
+  const target = resolve(from, out);
+  for (const read of [scene, path])
+    if (read !== undefined && isSameFile(target, resolve(from, read)))
+      throw new UsageError(`--out: expected another file than ${read}, which is never changed`);
+  if (isVideo(out)) {
+    const obstacle = obstacleTo(target);
+    if (obstacle) throw new UsageError(`--out: ${obstacle}`);
+    return checkVideo(target, width, height);
+  }
+  if (existsSync(target) && !statSync(target).isDirectory())
+    throw new UsageError(`--out: expected a folder, or a file that ends in .mp4 or .webm; ${out} is a file`);
+  if (!existsSync(dirname(target))) throw new UsageError(`--out: the folder ${dirname(target)} does not exist`);
+}
+
+/** A folder of numbered PNG files, with the methods of a video. */
+function openFolder(folder, { width, height, frames }) {
+  mkdirSync(folder, { recursive: true });
+  const digits = Math.max(4, String(frames - 1).length);
+  let frame = 0;
+  return {
+    async write(bytes) {
+      const name = `frame-${String(frame++).padStart(digits, '0')}.png`;
+      writeWhole(join(folder, name), encodePng(bytes, width, height));
+    },
+    async finish() {},
+    abort() {},
+  };
+}
+
+async function video(options) {
+  checkFiles(options);
+  const views = options.path === undefined ? undefined : readViews(options.path);
+  const cloud = await readSceneFile(options.scene);
+  sayWarnings(options.scene, cloud);
+  const { width, height, frameRate } = options;
+  const cameras = camerasAlong({ ...options, views, bounds: { ...boundsOf(cloud), up: cloud.hints?.up } });
+  if (cameras.length > MOST_FRAMES)
+    throw new UsageError(`--seconds: expected at most ${MOST_FRAMES} frames, found ${cameras.length}`);
+  const renderer = await openSceneRenderer(cloud, options.drawing);
+  const target = resolve(from, options.out);
+  const open = isVideo(target) ? openVideo : openFolder;
+  const isOpaque = options.drawing.background[3] === 1;
+  const output = open(target, { width, height, frameRate, isOpaque, frames: cameras.length });
+  try {
+    for (const camera of cameras) await output.write(toBytes(await renderer.draw(camera)));
+    await output.finish();
+  } catch (error) {
+    output.abort();
+    throw error;
+  }
+  console.log(
+    `${options.out}: ${cameras.length} frames of ${width}x${height}, ${+(cameras.length / frameRate).toFixed(2)} s; ` +
+      `${cloud.count} splats by ${renderer.viewpoint.rasterizer} in ${renderer.accumulation} on ${renderer.adapterName}`,
+  );
+}
+
+await runCommand(USAGE, parseOptions, video);

@@ -1,0 +1,57 @@
+/** German. */
+import type { Words } from '../words.js';
+
+export const words: Words = {
+  front: 'Ansicht von vorn',
+  right: 'Ansicht von rechts',
+  back: 'Ansicht von hinten',
+  left: 'Ansicht von links',
+  'upper-front': 'Ansicht von vorn oben',
+  'upper-right': 'Ansicht von rechts oben',
+  'upper-back': 'Ansicht von hinten oben',
+  'upper-left': 'Ansicht von links oben',
+  'lower-front': 'Ansicht von vorn unten',
+  'lower-right': 'Ansicht von rechts unten',
+  'lower-back': 'Ansicht von hinten unten',
+  'lower-left': 'Ansicht von links unten',
+  scene: '3D-Szene',
+  role: '3D-Ansicht',
+  show: '… anzeigen',
+  loading: 'Die 3D-Szene wird geladen',
+  details: 'Einzelheiten',
+  'controls-panel': 'Regler',
+  'controls-reset': 'Zurücksetzen',
+  'controls-time': 'Zeit',
+  'controls-joint': 'Gelenk',
+  'controls-scene': 'Szene',
+  'error-unsupported': 'Diese 3D-Szene braucht WebGPU, das hier nicht verfügbar ist.',
+  'error-network': 'Die 3D-Szene konnte nicht heruntergeladen werden.',
+  'error-decode': 'Die 3D-Szene konnte nicht gelesen werden.',
+  'error-contract': 'Das Modell der 3D-Szene konnte nicht ausgeführt werden.',
+  'error-device-lost':
+    'Die Verbindung zur Grafikkarte ging verloren. Laden Sie die Seite neu, um die 3D-Szene zu sehen.',
+  'error-out-of-memory': 'Die 3D-Szene braucht mehr Speicher, als dieses Gerät hat.',
+  views: 'Ansichten',
+  'next-view': 'Nächste Ansicht',
+  'previous-view': 'Vorherige Ansicht',
+  'keys-views': 'N und P zeigen die nächste und die vorherige Ansicht, 1 bis 9 die ersten.',
+  'keys-walk':
+    'Die Pfeiltasten nach oben und unten gehen, links und rechts drehen, W, A, S und D gehen in alle Richtungen, mit Umschalt schneller. Ein Klick auf den Boden geht dorthin. Pos1 stellt die Ansicht zurück.',
+  blocked: 'Hier geht es nicht weiter',
+  'keys-orbit':
+    'Die Pfeiltasten drehen die Ansicht, Bild auf und Bild ab oder Plus und Minus ändern den Abstand, Umschalt mit den Pfeiltasten verschiebt sie, Pos1 stellt sie zurück.',
+  'keys-fly':
+    'Die Pfeiltasten sehen sich um, W und S fliegen vor und zurück, A und D zur Seite, E und Q auf und ab, mit Umschalt schneller, Pos1 stellt die Ansicht zurück.',
+  'interaction-prompt': 'Ziehen, um sich umzusehen',
+  reset: 'Ansicht zurücksetzen',
+  pause: 'Anhalten',
+  play: 'Abspielen',
+  vr: 'In VR ansehen',
+  ar: 'Im eigenen Raum ansehen',
+  'exit-ar': 'AR verlassen',
+  'ar-simplified': 'Ein vereinfachtes Modell in AR ansehen',
+  measure: 'Messen',
+  'measure-keys':
+    'Die Eingabetaste setzt beide Enden des Lineals, die Pfeiltasten drehen die Ansicht. Escape legt das Lineal weg.',
+  'measure-none': 'Hier ist keine Oberfläche',
+};

@@ -1,0 +1,135 @@
+/** Videos: frames of `gaussian-splat video` and of the element are the same, and the browser records what is on the screen. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { executeServerCommand } from '@web/test-runner-commands';
+import { itInLab, someOf } from '../../support/extent-in-pages.js';
+import { assert, assertEqual, COMPASS, FIXTURES, showLoaded, until } from './support/harness.js';
+
+const PATH = `${FIXTURES}path.json`;
+const SIZE = { width: 96, height: 72 };
+const STILL = { alt: 'A compass', 'interaction-prompt': 'none', views: PATH };
+const STYLE = 'width: 96px; height: 72px';
+
+async function pixelsOf(image: Blob): Promise<Uint8ClampedArray> {
+  const bitmap = await createImageBitmap(image);
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
+  context.drawImage(bitmap, 0, 0);
+  return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+}
+
+/** Frames of the command, in whose arguments paths start at the repository's root. */
+async function framesOfCommand(...args: string[]): Promise<Blob[]> {
+  const ask = (): Promise<string | string[]> => executeServerCommand<string | string[], string[]>('video-frames', args);
+  let found = await ask();
+  while (typeof found === 'string') found = await ask();
+  return found.map((text) => new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], { type: 'image/png' }));
+}
+
+async function framesOf(images: AsyncIterable<Blob>): Promise<Blob[]> {
+  const frames: Blob[] = [];
+  for await (const image of images) frames.push(image);
+  return frames;
+}
+
+/** Greatest difference of two lists of images, in steps of 1/255. */
+async function greatestDifference(some: readonly Blob[], others: readonly Blob[]): Promise<number> {
+  assertEqual(some.length, others.length, 'frames');
+  let greatest = 0;
+  for (const [i, image] of some.entries()) {
+    const [a, b] = await Promise.all([pixelsOf(image), pixelsOf(others[i])]);
+    assertEqual(a.length, b.length, 'values of a frame');
+    for (let k = 0; k < a.length; k++) greatest = Math.max(greatest, Math.abs(a[k] - b[k]));
+  }
+  return greatest;
+}
+
+const WHITE = ['--background', '1,1,1', '--size', `${SIZE.width}x${SIZE.height}`];
+const inRepository = (url: string): string => url.replace(/^\//, '');
+
+describe('the frames of a path', () => {
+  const same = async (src: string, frames: number, path: 'views' | 'turntable'): Promise<void> => {
+    const way = path === 'views' ? ['--path', inRepository(PATH)] : ['--turntable'];
+    const command = framesOfCommand(inRepository(src), ...way, '--frames', `${frames}`, ...WHITE);
+    const element = await showLoaded({ ...STILL, src }, STYLE);
+    const own = await framesOf(element.recordFrames({ ...SIZE, path, frames, background: 'white' }));
+    const difference = await greatestDifference(own, await command);
+    assert(difference <= 1, `${src}, ${path}: frames differ by ${difference} / 255`);
+    const change = await greatestDifference(own.slice(0, 1), own.slice(1, 2));
+    assert(change > 20, `the camera moves: ${change} / 255`);
+  };
+
+  for (const path of someOf(['views', 'turntable'] as const, 1))
+    it(`are those of gaussian-splat video: ${path}`, () => same(COMPASS, 6, path));
+  itInLab('are so in a video of 120 frames', () => same('/demo/scenes/skull.spz', 120, 'views'));
+
+  it('are those of the element at their times, and leave the camera where it was', async () => {
+    const element = await showLoaded(STILL, STYLE);
+    const before = element.getCameraOrbit().toString();
+    const frames = await framesOf(element.recordFrames({ path: 'views', frames: 4, background: 'white' }));
+    assertEqual(element.getCameraOrbit().toString(), before, 'camera');
+    const shown: Blob[] = [];
+    for (let i = 0; i < 4; i++) {
+      await element.showAlong(i / 3);
+      shown.push(await element.toBlob({ background: 'white' }));
+    }
+    assertEqual(await greatestDifference(frames, shown), 0, 'difference');
+  });
+
+  it('end where they are to end, and say what they lack', async () => {
+    const element = await showLoaded({ ...STILL, views: '[]' }, STYLE);
+    for await (const image of element.recordFrames({ path: 'turntable', frames: 100 })) {
+      assertEqual(image.type, 'image/png', 'type');
+      break;
+    }
+    const failed = await framesOf(element.recordFrames({ path: 'views' })).catch((error: Error) => error.name);
+    assertEqual(failed, 'TypeError', 'without views');
+    const endless = await framesOf(element.recordFrames()).catch((error: Error) => error.name);
+    assertEqual(endless, 'TypeError', 'without an end');
+  });
+});
+
+describe('record()', () => {
+  const play = async (video: Blob): Promise<HTMLVideoElement> => {
+    const player = Object.assign(document.createElement('video'), { muted: true, src: URL.createObjectURL(video) });
+    document.body.append(player);
+    await player.play();
+    await until(() => player.currentTime > 0.2, 'frames of the video');
+    player.pause();
+    return player;
+  };
+  /** Darkest channel of a corner, and of all pixels. */
+  const colorsOf = (player: HTMLVideoElement): { corner: number; darkest: number } => {
+    const context = new OffscreenCanvas(player.videoWidth, player.videoHeight).getContext('2d')!;
+    context.drawImage(player, 0, 0);
+    const { data } = context.getImageData(0, 0, player.videoWidth, player.videoHeight);
+    return { corner: Math.min(...data.subarray(0, 3)), darkest: Math.min(...data) };
+  };
+  const load = (): Promise<GaussianSplatElement> => showLoaded({ ...STILL, 'camera-orbit': '0deg 80deg 60%' }, STYLE);
+
+  it('is a video of what is on show, which browsers play', async () => {
+    const element = await load();
+    const before = element.getCameraOrbit().toString();
+    const video = await element.record({ path: 'turntable', duration: 600 });
+    assert(video.size > 100 && /^video\/(webm|mp4)/.test(video.type), `${video.size} bytes of ${video.type}`);
+    assertEqual(element.getCameraOrbit().toString(), before, 'camera');
+    const player = await play(video);
+    assertEqual([player.videoWidth, player.videoHeight], [96, 72], 'size');
+    const { corner, darkest } = colorsOf(player);
+    assert(corner > 230 && darkest < 120, `white behind the compass: ${corner}, ${darkest}`);
+    player.remove();
+  });
+
+  it('ends by a signal, and says what it cannot do', async () => {
+    const element = await load();
+    const controller = new AbortController();
+    setTimeout(() => controller.abort(), 300);
+    const video = await element.record({ signal: controller.signal });
+    assert(video.size > 100, `${video.size} bytes`);
+    const names = await Promise.all(
+      [{}, { duration: 9, mimeType: 'video/none' }, { duration: 9, background: 'no color' }].map((options) =>
+        element.record(options).catch((error: Error) => error.name),
+      ),
+    );
+    assertEqual(names, ['TypeError', 'NotSupportedError', 'TypeError'], 'errors');
+  });
+});
