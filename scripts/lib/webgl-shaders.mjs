@@ -59,7 +59,7 @@ export async function webglShaders() {
       '/**',
       ' * Written by `npm run shaders:webgl` from shaders/webgl and shaders/shared, and committed: see scripts/lib/webgl-shaders.mjs. Do not edit.',
       ' */',
-      '/** Of the WGSL that this was made of. */',
+      '/** Digest of the WGSL that this file was generated from. */',
       `export const SOURCE_DIGEST = '${digestOfSource()}';`,
       '/** Texels in a row of the textures that hold arrays. */',
       `export const DATA_WIDTH = ${Number(/const DATA_WIDTH = (\d+)u;/.exec(codeOf('quads'))[1])};`,

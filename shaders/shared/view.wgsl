@@ -29,7 +29,7 @@ struct View {
   // Bits of a depth key: 32 for the float32 depth itself, fewer for a fraction of the visible range; 33 for the
   // distance from the eye.
   key_bits: u32,
-  // Largest factor by which the camera matrix stretches a vector: 1 for a rotation and a translation.
+  // Upper bound of the factor by which the camera matrix stretches a vector: 1 for a rotation and a translation.
   stretch: f32,
   // 1 if the block has levels of detail.
   has_detail: u32,

@@ -82,7 +82,7 @@ function draftPose(name: string, sizes: readonly unknown[], questions: string[])
   return { role: 'pose', format: sizes.length === 2 && sizes[1] === 3 ? 'axis-angle' : 'parameters' };
 }
 
-/** Of [N, 3, K] and [N, K, 3]. */
+/** Layout of spherical harmonics outputs: [N, 3, K] is channel-major, [N, K, 3] coefficient-major. */
 function shOrderOf(outputs: readonly OnnxTensor[], name: string): 'coefficient-major' | 'channel-major' {
   const dims = outputs.find((output) => output.name === name)?.dims;
   return dims?.length === 3 && dims[1] === 3 && dims[2] !== 3 ? 'channel-major' : 'coefficient-major';

@@ -108,8 +108,8 @@ export interface GaussianCloud {
  */
 export const MAX_SCALE = 1e12;
 /**
- * Upper limit of the coordinates of a drawable splat, in world units: products of two are far from the limit of
- * float32, in which bounds of chunks are computed.
+ * Upper limit of the coordinates of a drawable splat, in world units: products of two stay far below the limit of
+ * float32, the type of chunk bounds.
  */
 export const MAX_POSITION = 1e18;
 export const MIN_LONGEST_SCALE = 1e-12;

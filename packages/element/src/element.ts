@@ -97,7 +97,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<PreviewDetail>} preview - Fired when a part of the scene becomes visible while the rest loads.
  * @fires {CustomEvent<ElementError>} error - Fired when the scene cannot be displayed; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<GaussianSplatError>} shader-error - Fired when the function of `splatShader` does not compile; `detail` contains the line. The scene is drawn without it.
- * @fires {CustomEvent<CameraChangeDetail>} camera-change - Fired when the camera has moved; `detail.source` tells what moved it.
+ * @fires {CustomEvent<CameraChangeDetail>} camera-change - Fired when the camera has moved; `detail.source` is what moved it.
  * @fires {CustomEvent<ViewChangeDetail>} view-change - Fired when the camera starts to move to a view of the list.
  * @fires {CustomEvent<WalkReadyDetail>} walk-ready - Fired when the floor of `navigation="walk"` is known and the camera stands on it.
  * @fires {CustomEvent<ImmersiveStatusDetail>} vr-status - Fired when VR becomes available, starts, ends, or fails.

@@ -42,7 +42,7 @@ interface RunRequest {
 export class PostProcessor {
   /** The input for the image. */
   readonly input: ImageInput;
-  /** The input that takes the depth of the frame; undefined where no model has one. */
+  /** The input that takes the depth of the frame; undefined if no model has one. */
   readonly depth: ImageInput | undefined;
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;

@@ -78,7 +78,7 @@ export type SplatCutProps = Omit<React.HTMLAttributes<SplatCutElement>, keyof Se
   SettableCutProperties &
   React.RefAttributes<SplatCutElement>;
 
-/** A region of space in which splats are hidden or changed: `<SplatCut shape="plane" position={[0, 0.8, 0]} />`. */
+/** A region of space with hidden or changed splats: `<SplatCut shape="plane" position={[0, 0.8, 0]} />`. */
 export const SplatCut: React.ForwardRefExoticComponent<SplatCutProps> = /* @__PURE__ */ createComponent({
   react: React,
   events: {},

@@ -148,7 +148,7 @@ const budgetOn = (device: GPUDevice): Promise<DetailBudget> =>
 
 const whatOf = ({ count }: PackedHead): string => `scene of ${count} splats`;
 
-/** What a part of a buffer is to hold. */
+/** Content to write to a part of a buffer. */
 interface Content {
   readonly buffer: GPUBuffer;
   /** Bytes of the buffer before it. */
@@ -165,7 +165,7 @@ function wordsOf(
   return new Uint32Array(buffer as ArrayBuffer, byteOffset + 4 * from, Math.min(count, length - from));
 }
 
-/** What the bytes of a scene follow from. */
+/** The properties that determine the bytes of a scene. */
 type SceneSize = PackedHead & Pick<PackedGaussians, 'details'>;
 
 /** Bytes that a scene takes on the GPU. */

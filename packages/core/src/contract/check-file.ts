@@ -5,7 +5,7 @@ import type { ContractFault } from './contract-error.js';
 /** Versions that ONNX Runtime 1.30 supports. */
 export const RUNTIME_LIMITS = { irVersion: 13, oldestOpset: 7, newestOpset: 26 } as const;
 
-/** Operator domains for which onnxruntime-web has kernels, besides ONNX's own. */
+/** Operator domains that onnxruntime-web has kernels for, besides ONNX's own. */
 const RUNTIME_DOMAINS = ['com.microsoft', 'ai.onnx.ml'];
 
 export interface CheckFileOptions {

@@ -212,8 +212,8 @@ export interface ImageInput {
 }
 
 /**
- * Of a post-processor. [1,1,H,W] float32 or float16: the depth of the frame along the camera's axis, in world units, at which half of the light is gone, top row
- * first; 0 where more than half passes.
+ * Input of a post-processor. [1,1,H,W] float32 or float16: the depth of the frame along the camera's axis, in world
+ * units, at which half of the light is absorbed, top row first; 0 if more than half passes.
  */
 export interface DepthInput {
   readonly role: 'depth';

@@ -22,7 +22,7 @@ const HALF_SMALLEST = 2 ** -25;
 /** A covariance R·S·Sᵀ·Rᵀ computed in the precision of its numbers accumulates about ten roundings in each of them. */
 const COVARIANCE_ROUNDINGS = 16;
 
-/** Limit at which the square is still a float32 covariance. */
+/** Largest scale whose square is still a float32 covariance. */
 const LARGEST_SCALE = 1e18;
 
 /** Checks one attribute of one row; undefined if it is valid. */

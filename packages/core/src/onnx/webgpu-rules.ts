@@ -55,6 +55,6 @@ export const WEBGPU_RULES = {
   mostSplitOutputs: 9,
   /** CumSum lets each thread sum its whole prefix. */
   longestCumSum: 4096,
-  /** Export opset for which all rules above hold. */
+  /** Export opset that satisfies all rules above. */
   exportOpset: 18,
 } as const;

@@ -212,8 +212,8 @@ class ClipCoder {
   }
 
   /**
-   * Finds the steps that reach the target in a frame of the first group, and at which a byte saves the same error in
-   * all attributes.
+   * Finds the steps that reach the target in a frame of the first group, with equal error reduction per byte in all
+   * attributes.
    */
   async #findSteps(
     parts: readonly TrackedPart[],

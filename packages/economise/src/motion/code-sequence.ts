@@ -121,7 +121,7 @@ async function codeFirst({ openFrame, device, encodeWebp }: CodeSequenceOptions,
 }
 
 /**
- * Finds the steps that reach the target in a frame of a file of motion, and at which a byte saves the same error in all
+ * Finds the steps that reach the target in a frame of a file of motion, with equal error reduction per byte in all
  * attributes.
  */
 async function findMotionSteps(

@@ -13,7 +13,7 @@ export type TaskResult<Name extends TaskName> = Awaited<ReturnType<Tasks[Name]>>
 export interface TaskPool {
   /** Number of tasks that run in parallel. */
   readonly size: number;
-  /** Smaller numbers of splats are processed faster by the calling thread. */
+  /** Fewer splats than this are processed faster by the calling thread. */
   readonly leastSplats: number;
   /** Memory that tasks share with their caller. */
   allocate(byteLength: number): ArrayBufferLike;

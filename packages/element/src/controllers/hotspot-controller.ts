@@ -17,7 +17,7 @@ const STYLES = css`
   }
   /* Apart from the box that moves: style of what has transitions takes three times as long to recalculate. */
   .hotspot > div {
-    /* Else a label that fades is laid out anew. */
+    /* Isolated, so that a fading label does not cause a layout. */
     isolation: isolate;
     opacity: var(--max-hotspot-opacity, 1);
     transition: opacity 0.3s;

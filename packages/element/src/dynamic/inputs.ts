@@ -19,7 +19,7 @@ export interface GeneratorInput {
   readonly step?: number;
   /** Default: all elements, or one number for all. */
   readonly default?: number | readonly number[];
-  /** Of a pose. */
+  /** Format of the rotations of a pose. */
   readonly format?: 'axis-angle' | 'quaternion' | 'matrix' | 'parameters';
   readonly quaternionOrder?: 'wxyz' | 'xyzw';
   readonly joints?: readonly string[];

@@ -19,7 +19,7 @@ export class PartUploads {
   readonly #device: Promise<GPUDevice>;
   readonly #options: PartUploadOptions;
   #gaussians: Promise<GaussianBuffers> | undefined;
-  /** Fulfills once all portions so far are written. */
+  /** Fulfills once all portions received until now are written. */
   #written: Promise<void> = Promise.resolve();
   #left = BYTES_AT_ONCE;
 

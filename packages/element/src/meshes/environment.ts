@@ -28,7 +28,7 @@ const LAST = ${LEVELS - 1}.0;
 const SHARPER = ${SHARPER}.0;
 const PI = 3.14159265;
 const GOLDEN_ANGLE = 2.39996323;
-// Of the Gaussian that blurs the room, radians.
+// Standard deviation of the Gaussian that blurs the room, radians.
 const SIGMA = 0.04;
 const RAYS = 24u;
 
@@ -102,7 +102,7 @@ fn radiance(direction: vec3f) -> f32 {
   return select(lit(nearest * direction, normal), emitted, emitted > 0.0);
 }
 
-// Of a pixel of a face, as WebGPU samples cubes.
+// Direction of a pixel of a face, in the convention of WebGPU cube maps.
 fn directionOf(id: vec3u, size: f32) -> vec3f {
   let s = 2.0 * (f32(id.x) + 0.5) / size - 1.0;
   let t = 2.0 * (f32(id.y) + 0.5) / size - 1.0;
@@ -165,7 +165,7 @@ fn rougher(@builtin(global_invocation_id) id: vec3u) {
   var weights = 0.0;
   for (var i = 0u; i < samples; i++) {
     let u = (f32(i) + 0.5) / f32(samples);
-    // Of the reflected ray, sampled by visible normals (Heitz 2018).
+    // The reflected ray is sampled by visible normals (Heitz 2018).
     let cosTheta = (1.0 - u - alpha2 * u) / (1.0 - u + alpha2 * u);
     if (cosTheta <= 0.0) { continue; }
     sum += cosTheta * sampled(around(direction, cosTheta, f32(i) * GOLDEN_ANGLE));

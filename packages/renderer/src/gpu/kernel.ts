@@ -168,7 +168,7 @@ export function dispatchGrid(groups: number): [columns: number, rows: number] {
 /** `GPUShaderStage`, which is undefined if a module is imported outside a browser. */
 export const SHADER_STAGE = { vertex: 1, fragment: 2, compute: 4 } as const;
 
-/** `GPUBufferUsage` and `GPUTextureUsage`, likewise. */
+/** Bits of `GPUBufferUsage` and `GPUTextureUsage`. */
 export const BUFFER_USAGE = {
   mapRead: 0x1,
   mapWrite: 0x2,

@@ -25,7 +25,7 @@ export interface PackOptions {
   readonly sh?: ShPrecision | 'auto';
 }
 
-/** Packed Gaussians but for their bytes. */
+/** Properties of packed Gaussians without their data. */
 export interface PackedHead {
   readonly count: number;
   readonly shDegree: ShDegree;

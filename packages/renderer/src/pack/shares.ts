@@ -146,7 +146,7 @@ export class ShareCells {
   readonly #shares: PackedShare[] = [];
   /** Number of splats over all shards. */
   #count = 0;
-  /** Sums of noise, and numbers of splats, for each block. */
+  /** Sums of noise, and counts of splats, for each block. */
   readonly #noises = new Float64Array(1 << PART_BITS);
   readonly #counts = new Uint32Array(1 << PART_BITS);
 
@@ -303,9 +303,9 @@ function grow(chunks: Float32Array, at: number, floats: Float32Array, from: numb
 
 /** A scene whose blocks arrive in any order. */
 export class JoinedBlocks {
-  /** What is known of the scene before its blocks come. */
+  /** Properties of the scene that are known before its blocks arrive. */
   readonly head: PackedHead;
-  /** Bounds of all chunks, once all blocks are there. */
+  /** Bounds of all chunks, once all blocks have arrived. */
   readonly chunks: Float32Array<ArrayBuffer>;
   readonly #send: ((block: SortedBlock) => void) | undefined;
   readonly #geometry: Uint32Array;

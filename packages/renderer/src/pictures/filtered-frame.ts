@@ -35,7 +35,7 @@ export class FilteredFrame {
   readonly height: number;
   /** Target for the renderer. */
   readonly drawn: GPUTexture;
-  /** Of the drawn frame, for its target; undefined where no model takes depth. */
+  /** Depth of the drawn frame, for its target; undefined if no model takes depth. */
   readonly depth: SceneDepth | undefined;
   readonly #depthTexture: GPUTexture | undefined;
   #depthTensor: ImageTensor | undefined;

@@ -1,7 +1,7 @@
 /**
  * Written by `npm run shaders:webgl` from shaders/webgl and shaders/shared, and committed: see scripts/lib/webgl-shaders.mjs. Do not edit.
  */
-/** Of the WGSL that this was made of. */
+/** Digest of the WGSL that this file was generated from. */
 export const SOURCE_DIGEST = 'a1d64f735292d88627a3abeb189503cd';
 /** Texels in a row of the textures that hold arrays. */
 export const DATA_WIDTH = 4096;
