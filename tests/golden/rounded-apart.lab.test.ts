@@ -10,7 +10,7 @@ import { notFinite, turnedAway } from '../stability/support/pictures.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { psnr } from '../support/metrics.js';
 import type { Miscompilation } from '../support/miscompilation.js';
-import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { asOnSwiftShader, endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
@@ -79,7 +79,7 @@ for (const rasterizer of ['quads', 'tiles'] as const) {
     const [expected, visible] = await drawTurning(await serialDevice(), rasterizer);
     for (const side of [1, -1]) {
       const { device, befallen } = await faultyDevice(movedBy(side));
-      const [pixels, kept] = await drawTurning(device, rasterizer);
+      const [pixels, kept] = await drawTurning(await asOnSwiftShader(device), rasterizer);
       device.destroy();
       assert.ok(befallen.includes('gs.project'), befallen.join());
       assert.equal(befallen.length, rasterizer === 'tiles' ? 3 : 1, befallen.join());

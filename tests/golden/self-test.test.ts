@@ -187,6 +187,13 @@ const MUTANTS: readonly Mutant[] = [
     rasterizer: 'quads',
   },
   {
+    what: 'blending loses the last bits of float16, as lavapipe does',
+    shader: /gs.rasterize_quads$/,
+    from: 'return vec4f(quad.color.rgb * alpha, alpha);',
+    to: 'return bitcast<vec4f>(bitcast<vec4u>(vec4f(quad.color.rgb * alpha, alpha)) & vec4u(0xffffc000u));',
+    rasterizer: 'quads',
+  },
+  {
     what: 'splats are listed for one column of bins alone',
     shader: /gs.bin_count$/,
     from: '(count.x << 16u)',

@@ -24,7 +24,11 @@ async function turnFor(element: GaussianSplatElement, milliseconds: number): Pro
   return times;
 }
 
-const median = (values: readonly number[]): number => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
+const quantile = (values: readonly number[], share: number): number =>
+  [...values].sort((a, b) => a - b)[Math.floor(values.length * share)];
+const median = (values: readonly number[]): number => quantile(values, 0.5);
+/** Other work on the machine only ever adds to the time of a frame. */
+const undisturbed = (values: readonly number[]): number => quantile(values, 0.1);
 
 /** Turns the camera until the pace is known. */
 async function findPace(element: GaussianSplatElement): Promise<void> {
@@ -58,13 +62,14 @@ describe('the pace of pictures', () => {
       // Whole frames in motion, too: a page at rest leaves more of the processor.
       wholes.push(...(await turnFor(unhurried, 1_000)).slice(1));
     }
-    const [whole, paced] = [median(wholes), median(paceds)];
+    const whole = median(wholes);
+    const [quick, slow] = [undisturbed(paceds), undisturbed(wholes)];
     await turnFor(auto, 500);
     // A frame may just have been the last of its level.
     for (let i = 0; i < 10 && auto.stats?.dynamicQuality.drawn !== auto.stats?.dynamicQuality.moving; i++)
       await turnFor(auto, 100);
     const { dynamicQuality: pace, why } = auto.stats!;
-    console.log(`${whole.toFixed(0)} ms a frame at full quality, ${paced.toFixed(0)} with ${pace.moving}`);
+    console.log(`${slow.toFixed(0)} ms a frame at full quality, ${quick.toFixed(0)} with ${pace.moving}`);
     await turnFor(fixed, 1_000);
     await comeToRest(fixed);
     assertEqual(fixed.stats?.dynamicQuality.drawn, 'whole', 'a page that chose a quality gets it');
@@ -74,7 +79,7 @@ describe('the pace of pictures', () => {
     assert(pace.reason === 'slow' || pace.reason === 'trial', `the reason is ${pace.reason}`);
     assert(why.length === 1 && why[0].includes(pace.moving), `says: ${why.join(' ')}`);
     // A frame's time has the browser's own work on the same processor in it.
-    assert(paced < 0.9 * whole, `${paced} ms instead of ${whole}`);
+    assert(quick < 0.9 * slow, `${quick} ms instead of ${slow}`);
 
     // Frames of the other one still wait on the same queue.
     // The best of three: other tests share the processor.
@@ -213,11 +218,16 @@ describe('the pace of pictures', () => {
         return { spent, elapsed: performance.now() - began };
       };
       await turn(1_000);
-      const { spent, elapsed } = await turn(4_000);
-      console.log(`${spent.toFixed(0)} ms of frames in ${elapsed.toFixed(0)} ms`);
-      assert(spent > 0, 'frames were timed');
+      // The best of three: other work on the machine delays answers of the queue.
+      let share = Infinity;
+      for (let i = 0; i < 3 && share > 1.2; i++) {
+        const { spent, elapsed } = await turn(4_000);
+        console.log(`${spent.toFixed(0)} ms of frames in ${elapsed.toFixed(0)} ms`);
+        assert(spent > 0, 'frames were timed');
+        share = Math.min(share, spent / elapsed);
+      }
       // The queue does one thing after the other.
-      assert(spent <= 1.2 * elapsed, `${spent} ms of frames in ${elapsed} ms`);
+      assert(share <= 1.2, `frames took ${share} of the time`);
     } finally {
       document.body.replaceChildren();
       await delay(100);
