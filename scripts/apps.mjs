@@ -1,13 +1,14 @@
 /**
- * `npm run test:apps [-- NAME…]`: the apps of tests/apps, each as a user would make it. Installs our packages from a registry that has just the release, builds, opens the
+ * `npm run test:apps [-- NAME… [--newest]]`: the apps of tests/apps, each as a user would make it, with the versions that the list names or, with `--newest`, the latest ones. Installs our packages from a registry that has just the release, builds, opens the
  * app in Chromium, and the development server where the list has one. Each has to show its scene, with a worker and a clean console; what came over the wire until then is
  * printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
  */
 import { spawn, spawnSync } from 'node:child_process';
-import { cpSync, existsSync, mkdirSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { extname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { parseArgs } from 'node:util';
 import { APPS } from '../tests/apps/apps.mjs';
 import { visitApp } from '../tests/apps/visit.mjs';
 import { ensureChromium } from './lib/chromium.mjs';
@@ -17,12 +18,15 @@ import { root } from './lib/run.mjs';
 const CACHE = join(root, '.cache/apps');
 const SCENE = join(root, 'demo/scenes/skull.spz');
 const BUILD_SECONDS = 400;
+/** What `--newest` leaves as it is: Node itself, and what other packages of the app bound. */
+const NOT_NEWEST = new Set(['node', 'typescript', 'rxjs']);
 /** What Lit and the tools say of development. */
 const DEVELOPMENT = /Lit is in dev mode|\[vite\]|Download the React DevTools/;
 
-const words = process.argv.slice(2);
-const onlyInstall = words.includes('--install');
-const asked = words.filter((word) => word !== '--install');
+const { values: options, positionals: asked } = parseArgs({
+  allowPositionals: true,
+  options: { install: { type: 'boolean' }, newest: { type: 'boolean' } },
+});
 const names = asked.length > 0 ? asked : Object.keys(APPS);
 const unknown = names.filter((name) => !Object.hasOwn(APPS, name));
 if (unknown.length > 0) {
@@ -54,7 +58,8 @@ process.exit(failures > 0 ? 1 : 0);
 async function tryApp(name, app) {
   const folder = join(CACHE, name);
   await install(folder, name, app);
-  if (onlyInstall) return;
+  console.log(`${name}: ${versionsIn(folder, app)}`);
+  if (options.install) return;
   command(app.build, folder);
   if (!app.output) return console.log(`${name}: passes`);
   const output = join(folder, app.output);
@@ -91,7 +96,10 @@ async function install(folder, name, { folder: template = name, dependencies }) 
     mkdirSync(join(folder, place), { recursive: true });
     cpSync(SCENE, join(folder, place, 'scene.spz'));
   }
-  const entries = Object.entries(dependencies).map(([each, wanted]) => [each, wanted === 'release' ? version : wanted]);
+  const entries = Object.entries(dependencies).map(([each, wanted]) => [
+    each,
+    wanted === 'release' ? version : options.newest && !NOT_NEWEST.has(each) ? 'latest' : wanted,
+  ]);
   const manifest = { name: 'app', private: true, type: 'module', dependencies: Object.fromEntries(entries) };
   writeFileSync(join(folder, 'package.json'), JSON.stringify(manifest, null, 2));
   const address = `http://127.0.0.1:${registry.address().port}/`;
@@ -100,7 +108,27 @@ async function install(folder, name, { folder: template = name, dependencies }) 
   // It has the digests of our packages of the last time.
   rmSync(join(folder, 'package-lock.json'), { force: true });
   rmSync(join(folder, 'node_modules/.package-lock.json'), { force: true });
-  await soon(['npm', 'install', '--no-audit', '--no-fund', '--loglevel=error', '--prefer-offline'], folder);
+  await soon(
+    [
+      'npm',
+      'install',
+      '--no-audit',
+      '--no-fund',
+      '--loglevel=error',
+      options.newest ? '--prefer-online' : '--prefer-offline',
+    ],
+    folder,
+  );
+}
+
+/** The packages of an app, with the versions that were installed. */
+function versionsIn(folder, { dependencies }) {
+  const versionOf = (each) =>
+    JSON.parse(readFileSync(join(folder, 'node_modules', each, 'package.json'), 'utf8')).version;
+  return Object.keys(dependencies)
+    .filter((each) => dependencies[each] !== 'release')
+    .map((each) => `${each} ${versionOf(each)}`)
+    .join(', ');
 }
 
 /** The registry answers in this process, so it must not be kept busy meanwhile. */

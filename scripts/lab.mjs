@@ -9,6 +9,7 @@ const IN_CHROMIUM = {
   bench: ['scripts/bench/run-bench.mjs'],
   frontier: ['scripts/frontier/run-frontier.mjs'],
   soak: ['scripts/soak/run-soak.mjs'],
+  grid: ['scripts/grid/run-grid.mjs'],
   attack: ['scripts/attack/run-attack.mjs'],
   load: ['scripts/bench/run-load.mjs'],
 };

@@ -79,7 +79,7 @@ async function checkAll(browser, evaluate) {
     check(`${view.name} ${mode}`, `${decibels.toFixed(1)} dB, ${format}, ${times}`, decibels >= LEAST_DB);
   }
   const told = await evaluate(
-    `show({ src: '/scenes/skull.spz', 'camera-controls': '' }).then((element) => JSON.stringify([element.statistics.renderer, element.loaded, !!navigator.gpu]))`,
+    `show({ src: '/scenes/skull.spz', 'camera-controls': '' }).then((element) => JSON.stringify([element.stats.renderer, element.loaded, !!navigator.gpu]))`,
   );
   const [renderer, isLoaded, hasWebGpu] = JSON.parse(told);
   check('the element chooses by itself', told, isLoaded && renderer === (hasWebGpu ? 'webgpu' : 'webgl'));

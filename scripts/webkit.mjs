@@ -11,6 +11,7 @@ import {
   checkThrown,
   withSite,
 } from './engines/checks.mjs';
+import { checkPolicies } from './engines/policies.mjs';
 import { withDisplay } from './lib/firefox.mjs';
 import { launchWebKit, WebKitTab } from './lib/webkit.mjs';
 
@@ -34,6 +35,7 @@ const status = await withSite((origin) =>
       await checkHands(tab, { renderer: 'webgl', hasTouch: false });
       await checkLostContext(tab);
       await checkThrown(tab);
+      await checkPolicies(tab);
       await checkPages(tab, 'webkit');
     } finally {
       await webkit.close();

@@ -6,6 +6,8 @@ const PLACE = [13.4, 52.52];
 /** Meters. */
 const METERS_PER_DEGREE = [67_700, 111_300];
 const notice = document.getElementById('notice');
+if (!document.createElement('canvas').getContext('webgl2'))
+  notice.textContent = 'This page needs WebGL 2, which this browser does not offer.';
 setWorkerUrl(new URL('maplibre-gl-worker.mjs', document.baseURI).href);
 
 const at = (east, north) => [PLACE[0] + east / METERS_PER_DEGREE[0], PLACE[1] + north / METERS_PER_DEGREE[1]];

@@ -8,6 +8,8 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 const canvas = document.getElementById('stage');
 const notice = document.getElementById('notice');
+if (!document.createElement('canvas').getContext('webgl2'))
+  notice.textContent = 'This page needs WebGL 2, which this browser does not offer.';
 const renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
 const gl = renderer.getContext();
 const host = new GlHost(gl);

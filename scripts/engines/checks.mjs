@@ -13,6 +13,9 @@ const SIZE = { width: 300, height: 240 };
 /** Pages of the site that visitors see first, and those of frameworks. */
 const PAGES = ['/', '/gallery/', '/react/', '/vue/'];
 
+/** A check that takes longer has failed: pages that wait for ever tell nothing. */
+const MOST_MS = 240_000;
+
 let failures = 0;
 
 export function assert(condition, message) {
@@ -22,7 +25,10 @@ export function assert(condition, message) {
 export async function check(name, body) {
   const start = performance.now();
   try {
-    const found = await body();
+    const late = new Promise((_, reject) => {
+      setTimeout(() => reject(new Error(`not done after ${MOST_MS / 1000} s`)), MOST_MS).unref();
+    });
+    const found = await Promise.race([body(), late]);
     console.log(`ok      ${name}${found ? `: ${found}` : ''} (${Math.round(performance.now() - start)} ms)`);
   } catch (error) {
     failures++;
@@ -75,7 +81,7 @@ export async function checkParts(tab, renderer) {
   const found = async (body) =>
     JSON.parse(await tab.evaluate(`(async () => JSON.stringify(await (async () => { ${body} })()))()`));
   await check(`the renderer is ${renderer}`, async () => {
-    const name = await found(`${shown()}; return element.statistics.renderer;`);
+    const name = await found(`${shown()}; return element.stats.renderer;`);
     assert(name === renderer, name);
   });
   await check('labels: one in front is visible, one behind is not', async () => {
@@ -249,23 +255,23 @@ async function picturesOfChromium(origin, scenes) {
 }
 
 /** The upper left corner of a picture, as red, green and blue. */
-function cornerOf(bytes) {
+function cornerOf(bytes, size = SIZE) {
   const { width, data } = PNG.sync.read(bytes);
-  const colors = new Uint8Array(3 * SIZE.width * SIZE.height);
-  for (let y = 0, to = 0; y < SIZE.height; y++)
-    for (let x = 0; x < SIZE.width; x++) for (let c = 0; c < 3; c++) colors[to++] = data[4 * (y * width + x) + c];
+  const colors = new Uint8Array(3 * size.width * size.height);
+  for (let y = 0, to = 0; y < size.height; y++)
+    for (let x = 0; x < size.width; x++) for (let c = 0; c < 3; c++) colors[to++] = data[4 * (y * width + x) + c];
   return colors;
 }
 
-/** Share of the values that are other than white. */
-const paintedShare = (bytes) => {
-  const colors = cornerOf(bytes);
+/** Share of the values in the upper left corner of a picture that are other than white. */
+export function paintedShare(bytes, size = SIZE) {
+  const colors = cornerOf(bytes, size);
   return colors.reduce((sum, value) => sum + (value < 200 ? 1 : 0), 0) / colors.length;
-};
+}
 
 /** Of two PNG, over their colours; pictures that show nothing are refused. */
 function psnr(a, b) {
-  const [found, expected] = [a, b].map(cornerOf);
+  const [found, expected] = [a, b].map((bytes) => cornerOf(bytes));
   assert(paintedShare(b) > 500 / expected.length, 'an empty picture');
   const sum = found.reduce((total, value, i) => total + (value - expected[i]) ** 2, 0);
   return sum === 0 ? Infinity : 10 * Math.log10((255 ** 2 * found.length) / sum);

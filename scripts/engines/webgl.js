@@ -109,7 +109,7 @@ async function orderAges(attributes, milliseconds) {
       element.setAttribute('camera-orbit', `${theta}deg 75deg auto`);
       await new Promise(requestAnimationFrame);
     }
-    const { splats } = element.statistics;
+    const { splats } = element.stats;
     const perSecond = (1000 * frames) / (performance.now() - start);
     const sorted = ages.sort((a, b) => a - b);
     const [median, most] = [sorted[Math.floor(sorted.length / 2)], sorted.at(-1)];

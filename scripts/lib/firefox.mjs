@@ -130,11 +130,12 @@ export class FirefoxTab {
     this.#isSubscribed = firefox.send('session.subscribe', { events: ['log.entryAdded'] });
   }
 
+  /** @param path of the site, or an address */
   async open(path) {
     await this.#isSubscribed;
     await this.#firefox.send('browsingContext.navigate', {
       context: this.#firefox.tab,
-      url: this.#origin + path,
+      url: new URL(path, this.#origin).href,
       wait: 'complete',
     });
   }

@@ -79,9 +79,10 @@ export class WebKitTab {
     this.#origin = origin;
   }
 
+  /** @param path of the site, or an address */
   async open(path) {
     await this.#keepThrown();
-    await this.#webkit.send('POST', '/url', { url: this.#origin + path });
+    await this.#webkit.send('POST', '/url', { url: new URL(path, this.#origin).href });
   }
 
   /** The value of an expression, or of what it promises. */

@@ -35,6 +35,62 @@ for (const { prototype } of [GPUBuffer, GPUTexture]) {
   };
 }
 
+/** Bytes of a texel by the format's name, as far as the renderer uses it. */
+const BYTES_PER_TEXEL = {
+  R8: 1,
+  RG8: 2,
+  RGBA8: 4,
+  R32UI: 4,
+  RG32UI: 8,
+  RGBA32UI: 16,
+  R32F: 4,
+  RGBA16F: 8,
+  RGBA32F: 16,
+};
+/** Contexts of WebGL, each with its living textures and buffers and their bytes. A lost one has none. */
+export const contexts = new Map();
+
+const getContext = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function watched(kind, ...rest) {
+  const context = getContext.call(this, kind, ...rest);
+  if (kind === 'webgl2' && context && !contexts.has(context)) {
+    contexts.set(context, new Map());
+    this.addEventListener('webglcontextlost', () => contexts.delete(context));
+  }
+  return context;
+};
+
+/** Counts what is bound to the target of a call that allocates. */
+function watchGl(name, bindingOf, bytesOf) {
+  const { prototype } = WebGL2RenderingContext;
+  const allocate = prototype[name];
+  prototype[name] = function counting(...args) {
+    allocate.apply(this, args);
+    contexts.get(this)?.set(this.getParameter(bindingOf(this, args[0])), bytesOf(this, args));
+  };
+}
+watchGl(
+  'texStorage2D',
+  (gl) => gl.TEXTURE_BINDING_2D,
+  (gl, [, , format, width, height]) => {
+    const [name] = Object.keys(BYTES_PER_TEXEL).filter((each) => gl[each] === format);
+    if (!name) faults.push(`ledger: a texture of the format 0x${format.toString(16)}, whose bytes are not known`);
+    return BYTES_PER_TEXEL[name] * width * height;
+  },
+);
+watchGl(
+  'bufferData',
+  (gl, target) => (target === gl.UNIFORM_BUFFER ? gl.UNIFORM_BUFFER_BINDING : gl.ELEMENT_ARRAY_BUFFER_BINDING),
+  (_, [, data]) => data.byteLength ?? data,
+);
+for (const name of ['deleteTexture', 'deleteBuffer']) {
+  const free = WebGL2RenderingContext.prototype[name];
+  WebGL2RenderingContext.prototype[name] = function counting(object) {
+    contexts.get(this)?.delete(object);
+    return free.call(this, object);
+  };
+}
+
 addEventListener('error', ({ message }) => faults.push(`uncaught: ${message}`));
 addEventListener('unhandledrejection', ({ reason }) => faults.push(`unhandled: ${reason}`));
 for (const level of ['warn', 'error']) {
@@ -54,5 +110,6 @@ export function ledger() {
       if (kind === 'own') sum.byLabel[label] = (sum.byLabel[label] ?? 0) + bytes;
     }
   }
+  for (const objects of contexts.values()) for (const bytes of objects.values()) sum.own += bytes;
   return sum;
 }

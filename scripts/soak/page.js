@@ -52,6 +52,21 @@ const ACTIONS = {
   hide: (element, a) => (element.style.display = a < 0.5 ? 'none' : 'inline-block'),
   scroll: (element, a) => (element.style.marginTop = a < 0.5 ? '4000px' : ''),
   turn: (element, a, b) => element.setAttribute('camera-orbit', `${360 * a}deg ${20 + 140 * b}deg auto`),
+  child: (element, a) => {
+    if (element.querySelector('splat-scene, splat-mesh'))
+      return element.querySelector('splat-scene, splat-mesh').remove();
+    const child = document.createElement(a < 0.8 ? 'splat-scene' : 'splat-mesh');
+    child.setAttribute('src', a < 0.8 ? pick(SOURCES.slice(0, 6), a / 0.8) : '/fixtures/textured.glb');
+    element.append(child);
+  },
+  label: (element, a, b) => {
+    if (element.querySelector('button')) return element.querySelector('button').remove();
+    element.insertAdjacentHTML('beforeend', `<button slot="hotspot-a" data-position="${a} ${b} 0">a</button>`);
+  },
+  renderer: (element, a) => element.setAttribute('renderer', a < 0.5 ? 'webgl' : 'auto'),
+  detail: (element, a) => element.setAttribute('detail', a < 0.5 ? '2px' : 'auto'),
+  save: (element) => void element.toBlob().catch(() => undefined),
+  look: (element, a, b) => void element.positionFromPoint(120 * a, 90 * b),
   quality: (element, a) => element.setAttribute('quality', pick(QUALITIES, a)),
   play: (element) => void element.play().catch(() => undefined),
   pause: (element) => element.pause(),

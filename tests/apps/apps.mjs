@@ -71,6 +71,25 @@ export const APPS = {
     output: 'dist',
     dev: ['npx', 'vite', '--port', 'PORT', '--strictPort'],
   },
+  preact: {
+    dependencies: { ...ELEMENT, preact: '11.2.0', vite: '8.3.8', '@preact/preset-vite': '2.10.6' },
+    build: ['npx', 'vite', 'build'],
+    output: 'dist',
+    dev: ['npx', 'vite', '--port', 'PORT', '--strictPort'],
+  },
+  'react-router': {
+    dependencies: {
+      ...{ ...REACT, ...NODE, vite: '8.3.8', isbot: '5.2.3' },
+      ...{ 'react-router': '8.4.0', '@react-router/dev': '8.4.0', '@react-router/node': '8.4.0' },
+    },
+    build: ['npx', 'react-router', 'build'],
+    output: 'build/client',
+  },
+  rsbuild: {
+    dependencies: { ...REACT, '@rsbuild/core': '2.3.2', '@rsbuild/plugin-react': '2.1.1' },
+    build: ['npx', 'rsbuild', 'build'],
+    output: 'dist',
+  },
   webpack: {
     dependencies: { ...ELEMENT, webpack: '5.112.2', 'webpack-cli': '7.3.1' },
     build: ['npx', 'webpack', '--mode', 'production', '--output-public-path', 'auto'],

@@ -248,6 +248,11 @@ export class ElementCore
     return this.sources.ownEntry.live;
   }
 
+  /** Brings back what was dropped out of sight. */
+  present(): Promise<unknown> {
+    return Promise.all(this.sources.entries.map(({ scene }) => scene.present()));
+  }
+
   /** Draws a frame now and returns its canvas, to be read within the same task; null if there is nothing to draw. */
   drawNow(...picture: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
     return this.sources.ownEntry.scene.isPreview ? null : this.view.drawNow(...picture);

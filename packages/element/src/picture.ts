@@ -9,6 +9,8 @@ export interface PictureHost {
   readonly canvas: HTMLCanvasElement | null;
   readonly view: Pick<ViewController, 'backend'>;
   warn(sentence: string): void;
+  /** Brings back what was dropped out of sight. */
+  present(): Promise<unknown>;
   /** Draws a frame into the element's canvas now; null if there is nothing to draw. */
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
 }
@@ -23,6 +25,7 @@ const LOST = 'The GPU device was lost before the image was drawn: take it again 
 
 export async function takePicture(host: PictureHost, options: ImageOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
+  await host.present();
   const { backend } = host.view;
   const pixels = backend && sizeOf(options, host.canvas, backend.place.limits.maxTextureDimension2D);
   const drawn = host.drawNow(pixels ?? undefined, background === undefined ? undefined : rgbaOf(background));

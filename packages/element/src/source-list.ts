@@ -45,6 +45,7 @@ export class SourceList implements EntryList {
   #arrivals: Promise<void> | undefined;
   #latest: SourceEntry | undefined;
   #isFramed = false;
+  #bounds: SceneBounds | null = null;
   #isLoadReported = false;
   readonly #lost = new Set<SourceEntry>();
 
@@ -236,7 +237,9 @@ export class SourceList implements EntryList {
   get bounds(): SceneBounds | null {
     this.place();
     const bounds = boundsOfWorld(this.world);
-    return bounds ? { ...bounds, up: this.ownEntry.member?.scene.bounds.up } : null;
+    if (bounds) this.#bounds = { ...bounds, up: this.ownEntry.member?.scene.bounds.up };
+    // A scene that was released out of view, or with its device, is still where it was.
+    return bounds || this.hasPicture ? this.#bounds : null;
   }
 
   /** The same, measured again for generators, which may have moved. */

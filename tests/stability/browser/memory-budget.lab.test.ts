@@ -169,6 +169,12 @@ describe('S12: scenes out of sight', () => {
       assert(blob.size > 1000, `an image of ${blob.size} bytes`);
       assertEqual(events, [], 'events');
       assertEqual(ledger().bytes, one, 'bytes while the first is in sight');
+      second.scrollIntoView();
+      await until(() => second.stats !== null && first.stats === null, 'the second in place of the first');
+      const box = first.getBoundingBox();
+      assert(box && box.max.x > box.min.x, 'the box of a scene out of sight');
+      const image = await first.toBlob();
+      assertEqual(image.size, blob.size, 'bytes of an image that is taken out of sight');
     });
   });
 });

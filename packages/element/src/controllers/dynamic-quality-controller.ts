@@ -148,12 +148,15 @@ export class DynamicQualityController {
     // Uses full resolution until the error of lower ones is known.
     const isUnknown = this.#drawn.scale < 1 && !this.#losses;
     if (isUnknown) this.#drawn = this.#levels.findLast(({ scale }) => scale === 1)!;
-    render(this.#drawn.settings, (time) => {
-      if (plan.level === 0) this.#fade.start(canvas);
-      if (!isUnknown) this.sample(plan, time);
-    });
+    const drawn = new Promise<void>((resolve) =>
+      render(this.#drawn.settings, (time) => {
+        resolve();
+        if (plan.level === 0) this.#fade.start(canvas);
+        if (!isUnknown) this.sample(plan, time);
+      }),
+    );
     if (this.#measuring) return;
-    if (isUnknown || (plan.level === 0 && this.#state.level > 0)) this.#measure(canvas, occasion.pixels);
+    if (isUnknown || (plan.level === 0 && this.#state.level > 0)) this.#measure(canvas, occasion.pixels, drawn);
   }
 
   /** @returns Whether the frame was another one of the motion. */
@@ -166,9 +169,9 @@ export class DynamicQualityController {
   }
 
   /** Measures the error of lower resolutions for the last frame. If that fails, all levels are used. */
-  #measure(canvas: HTMLCanvasElement, pixels: number): void {
+  #measure(canvas: HTMLCanvasElement, pixels: number, drawn: Promise<unknown>): void {
     const scales = this.#all.flatMap(({ scale }) => (scale < 1 ? scale : []));
-    const measuring = lossesOf(canvas, scales).catch((): Losses => new Map());
+    const measuring = lossesOf(canvas, scales, drawn).catch((): Losses => new Map());
     this.#measuring = measuring;
     void measuring.then((losses) => {
       if (this.#measuring !== measuring) return;

@@ -173,9 +173,15 @@ export class SceneController implements ReactiveController {
   see(isSeen: boolean): void {
     if (!isSeen && this.#isUnseen === undefined) return;
     this.#isUnseen = !isSeen;
-    if (isSeen && this.#isAway) void this.#attempt(this.#request!, this.#running.renew(), false, () => undefined);
-    if (isSeen) this.#isAway = false;
+    if (isSeen) void this.present();
     this.#setReleasable(false);
+  }
+
+  /** Brings the scene back if it was dropped out of sight. It may be dropped again afterwards. */
+  async present(): Promise<void> {
+    if (!this.#isAway) return;
+    this.#isAway = false;
+    await this.#attempt(this.#request!, this.#running.renew(), false, () => undefined);
   }
 
   /**

@@ -15,9 +15,16 @@ interface Block extends Pixels {
  * Loss of frames with fewer pixels, by the fraction of pixels across and down: dB over the covered pixels of blocks
  * spread over the image. The work is split into tasks of a few milliseconds.
  * @param canvas whose frame was drawn in the current task
+ * @param drawn fulfills once the GPU has drawn it: reading its pixels earlier would block the page
  */
-export async function lossesOf(canvas: HTMLCanvasElement, scales: readonly number[]): Promise<Map<number, number>> {
-  const blocks = blocksOf(await createImageBitmap(canvas));
+export async function lossesOf(
+  canvas: HTMLCanvasElement,
+  scales: readonly number[],
+  drawn: Promise<unknown>,
+): Promise<Map<number, number>> {
+  const picture = await createImageBitmap(canvas);
+  await drawn;
+  const blocks = blocksOf(picture);
   const found = new Map<number, number>();
   for (const scale of scales) {
     const sum: LossSum = { sum: 0, values: 0 };
@@ -45,10 +52,29 @@ function blocksOf(picture: ImageBitmap): Block[] {
   });
   const [across, down] = [Math.min(SIDE, picture.width), Math.min(SIDE, picture.height)];
   picture.close();
-  return placed.map(({ x, y, column, row }) => {
-    const { data } = context.getImageData(column * SIDE, row * SIDE, across, down);
-    return { values: premultiplied(data), width: across, height: down, x, y };
-  });
+  // Each reading is a round trip to the GPU.
+  const { data } = context.getImageData(0, 0, columns * SIDE, rows * SIDE);
+  return placed.map(({ x, y, column, row }) => ({
+    ...{ x, y, width: across, height: down },
+    values: premultiplied(partOf(data, columns * SIDE, column * SIDE, row * SIDE, across, down)),
+  }));
+}
+
+/** A rectangle of an image of a width in pixels. */
+function partOf(
+  data: Uint8ClampedArray,
+  ofWidth: number,
+  left: number,
+  top: number,
+  width: number,
+  height: number,
+): Uint8ClampedArray {
+  const part = new Uint8ClampedArray(4 * width * height);
+  for (let row = 0; row < height; row++) {
+    const first = 4 * ((top + row) * ofWidth + left);
+    part.set(data.subarray(first, first + 4 * width), 4 * row * width);
+  }
+  return part;
 }
 
 /** The first pixel of a block around a place. */
