@@ -98,6 +98,17 @@ test('every tarball has its licence, its README and nothing that weighs', { skip
   );
 });
 
+test('npm publishes every package in a dry run, and corrects nothing', { skip }, () => {
+  const { status, stdout, stderr } = spawnSync('npm', ['publish', '--dry-run', '--workspaces', '--loglevel=warn'], {
+    ...{ cwd: root, encoding: 'utf8', shell: process.platform === 'win32', maxBuffer: 1 << 26 },
+  });
+  assert.equal(status, 0, stderr);
+  // That nobody is logged in is all that it may say.
+  const warnings = stderr.split('\n').filter((line) => /npm warn/i.test(line) && !/to be logged in/.test(line));
+  assert.deepEqual(warnings, []);
+  for (const { name } of tarballs) assert.ok(stdout.includes(`+ ${name}@`), `${name}: ${stdout}`);
+});
+
 test('packages that say where their sources are say it as the workspace does', () => {
   const read = (folder: string) =>
     JSON.parse(readFileSync(`${folder}/package.json`, 'utf8')) as Record<string, unknown>;
