@@ -1,10 +1,10 @@
 /** What fewer pixels lose of an image is found without keeping the page waiting for the GPU. */
-import type * as pictureLoss from '../../../packages/element/src/pace/picture-loss.js';
+import type * as imageLoss from '../../../packages/element/src/dynamic-quality/image-loss.js';
 import { assert, assertEqual, delay } from './support/harness.js';
 
 const { lossesOf } = (await import(
-  new URL('/packages/element/dist/pace/picture-loss.js', location.href).href
-)) as typeof pictureLoss;
+  new URL('/packages/element/dist/dynamic-quality/image-loss.js', location.href).href
+)) as typeof imageLoss;
 
 /** A gradient with a sharp edge. */
 function drawnCanvas(): HTMLCanvasElement {
