@@ -25,7 +25,10 @@ describe('what fewer pixels lose', () => {
     const { prototype } = OffscreenCanvasRenderingContext2D;
     const { getImageData } = prototype;
     let readings = 0;
-    prototype.getImageData = function counting(...args: Parameters<typeof getImageData>) {
+    prototype.getImageData = function counting(
+      this: OffscreenCanvasRenderingContext2D,
+      ...args: Parameters<typeof getImageData>
+    ) {
       readings++;
       return getImageData.apply(this, args);
     } as typeof getImageData;
