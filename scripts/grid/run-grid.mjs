@@ -60,8 +60,11 @@ process.exit(failures.length > 0 ? 1 : 0);
 
 /** A phone with 4 GB of memory. */
 async function openPhone(query) {
-  const { defaultBrowserType: _, ...phone } = devices['Pixel 7'];
-  const context = await browser.newContext({ ...phone, deviceScaleFactor: Number(values['pixel-ratio']) });
+  const { userAgent, viewport, isMobile, hasTouch } = devices['Pixel 7'];
+  const context = await browser.newContext({
+    ...{ userAgent, viewport, isMobile, hasTouch },
+    deviceScaleFactor: Number(values['pixel-ratio']),
+  });
   await context.addInitScript(() => Object.defineProperty(Navigator.prototype, 'deviceMemory', { get: () => 4 }));
   const page = await context.newPage();
   page.on('crash', () => failures.push('the page crashed'));
