@@ -248,7 +248,7 @@ export class ElementCore
     return this.sources.ownEntry.live;
   }
 
-  /** Brings back what was dropped out of sight. */
+  /** Brings the scenes back that were dropped out of view. */
   present(): Promise<unknown> {
     return Promise.all(this.sources.entries.map(({ scene }) => scene.present()));
   }
