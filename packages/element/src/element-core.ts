@@ -248,7 +248,7 @@ export class ElementCore
     return this.sources.ownEntry.live;
   }
 
-  /** Brings the scenes back that were dropped out of view. */
+  /** Loads again the scenes that were released out of view. */
   present(): Promise<unknown> {
     return Promise.all(this.sources.entries.map(({ scene }) => scene.present()));
   }

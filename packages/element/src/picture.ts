@@ -9,7 +9,7 @@ export interface PictureHost {
   readonly canvas: HTMLCanvasElement | null;
   readonly view: Pick<ViewController, 'backend'>;
   warn(sentence: string): void;
-  /** Brings the scenes back that were released out of view. */
+  /** Loads again the scenes that were released out of view. */
   present(): Promise<unknown>;
   /** Draws a frame into the element's canvas now; null if there is nothing to draw. */
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;

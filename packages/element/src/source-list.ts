@@ -238,7 +238,7 @@ export class SourceList implements EntryList {
     this.place();
     const bounds = boundsOfWorld(this.world);
     if (bounds) this.#bounds = { ...bounds, up: this.ownEntry.member?.scene.bounds.up };
-    // A scene that was released out of view, or with its device, is still where it was.
+    // Scenes released out of view, or with their device, keep their bounds.
     return bounds || this.hasPicture ? this.#bounds : null;
   }
 

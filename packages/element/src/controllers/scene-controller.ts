@@ -177,7 +177,7 @@ export class SceneController implements ReactiveController {
     this.#setReleasable(false);
   }
 
-  /** Brings the scene back if it was released out of view. It may be dropped again afterwards. */
+  /** Loads the scene again if it was released out of view. */
   async present(): Promise<void> {
     if (!this.#isAway) return;
     this.#isAway = false;

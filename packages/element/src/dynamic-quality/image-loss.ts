@@ -52,7 +52,7 @@ function blocksOf(picture: ImageBitmap): Block[] {
   });
   const [across, down] = [Math.min(SIDE, picture.width), Math.min(SIDE, picture.height)];
   picture.close();
-  // Each reading is a round trip to the GPU.
+  // Each call is a round trip to the GPU.
   const { data } = context.getImageData(0, 0, columns * SIDE, rows * SIDE);
   return placed.map(({ x, y, column, row }) => ({
     ...{ x, y, width: across, height: down },
@@ -60,7 +60,7 @@ function blocksOf(picture: ImageBitmap): Block[] {
   }));
 }
 
-/** A rectangle of an image of a width in pixels. */
+/** Copies a rectangle out of RGBA pixels; `ofWidth` is the width of the source. */
 function partOf(
   data: Uint8ClampedArray,
   ofWidth: number,
