@@ -458,7 +458,7 @@ export class GaussianSplatElement extends ViewingMethods {
 }
 
 /** Methods of VR and AR are added with their code. */
-// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging, @typescript-eslint/no-empty-object-type
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export interface GaussianSplatElement extends ImmersiveMethods, SoundProperties {}
 
 declare global {

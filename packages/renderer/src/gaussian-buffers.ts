@@ -110,7 +110,7 @@ export class GaussianBuffers implements GaussianScene {
       ofChunks: 1 | typeof constants.CULL_GROUP = 1,
     ): Content[] => {
       const contents: Content[] = [];
-      const capacity = Math.ceil(pages[0].count / ofChunks);
+      const capacity = Math.ceil((pages[0]?.count ?? 0) / ofChunks);
       for (let at = 0, first = start / ofChunks; at < (values?.length ?? 0);) {
         const page = Math.floor(first / capacity);
         const words = wordsOf(values!, at, stride * ((page + 1) * capacity - first));

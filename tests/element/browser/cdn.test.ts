@@ -52,7 +52,9 @@ describe('the CDN build', () => {
         .getEntriesByType('resource')
         .map(({ name }) => name)
         // What sets the quality while moving is fetched whenever the first picture is there.
-        .filter((name) => name.startsWith(`${origin}/cdn/`) && /cdn\/(?!pace)[^/]*-[\w-]{8}\.js$/.test(name));
+        .filter(
+          (name) => name.startsWith(`${origin}/cdn/`) && /cdn\/(?!dynamic-quality)[^/]*-[\w-]{8}\.js$/.test(name),
+        );
     const shown = async (src: string): Promise<GaussianSplatElement> => {
       const element = show({ src });
       await element.ready;
@@ -62,7 +64,7 @@ describe('the CDN build', () => {
     // The self-test of the GPU with the code that packs its splats (`sh`), reads its frames (`capture`) and the counts that it reads, printing, and on a first visit the search for what suits the GPU. What it found is kept.
     await until(() => Object.keys(localStorage).some((key) => key.startsWith('gaussian-splat ')), 'a choice is kept');
     const first = parts().length;
-    const expected = /cdn\/(trials|sh|capture|statistics|print-controller|search)-/;
+    const expected = /cdn\/(timing|sh|capture|statistics|print-controller|search)-/;
     const others = parts().filter((part) => !expected.test(part));
     assertEqual(others, [], 'further parts fetched for a PLY file');
     assert((await shown(COMPASS)).loaded, 'another is shown');

@@ -65,6 +65,6 @@ describe('code that cannot be loaded when it is needed', () => {
   });
 
   it("on the page's thread: what runs generators", async () => {
-    await assertLost('/tests/fixtures/generators/packed.onnx', 'live/open-dynamic-model.js', /runs generators/);
+    await assertLost('/tests/fixtures/generators/packed.onnx', 'dynamic/open-dynamic-model.js', /runs generators/);
   });
 });

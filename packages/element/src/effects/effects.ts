@@ -31,7 +31,7 @@ export interface EffectsHost {
   readonly frame: ViewerFrame;
   readonly isOnShow: boolean;
   readonly sources: {
-    readonly own: SourceEntry;
+    readonly ownEntry: SourceEntry;
     readonly entries: readonly SourceEntry[];
     readonly bounds: SceneBounds | null;
     readonly isPreview: boolean;
@@ -117,7 +117,7 @@ export class Effects implements Mover {
 
   /** Writes all effects to the world, before a frame. */
   prepareFrame(): void {
-    const { entries, own } = this.#host.sources;
+    const { entries, ownEntry: own } = this.#host.sources;
     this.#restartReveal(own);
     const members = entries.flatMap(({ member }) => member ?? []);
     for (const [member, modifier] of this.#modifiers) if (!members.includes(member)) this.#forget(member, modifier);

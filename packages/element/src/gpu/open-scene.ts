@@ -2,13 +2,20 @@ import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { startVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import type { DynamicRequest } from '../dynamic/dynamic-model.js';
-import type { FileRequest, LoadedSequence, PartListener, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type {
+  FileRequest,
+  LoadedScene,
+  LoadedSequence,
+  PartListener,
+  ProgressListener,
+  SceneRequest,
+} from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import { LoadedGaussians } from './loaded-gaussians.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
 import type { PartUploads } from './part-uploads.js';
-import { PreviewUploads } from './preview-uploads.js';
+import type { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu, why } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 import { shown, upload } from './upload.js';
@@ -85,8 +92,18 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
   const acquiring = options.device.acquire();
   // While the bytes are in transit, variants for the first frame are selected.
   const choosing = acquiring.then(({ device }) => startVariants(device, pictures()));
-  const previews =
-    options.onPreview && new PreviewUploads({ ...options, onPreview: options.onPreview, ready: choosing });
+  choosing.catch(ignore);
+  const { onPreview } = options;
+  let previews: Promise<PreviewUploads> | undefined;
+  const showPreview =
+    onPreview &&
+    ((preview: LoadedScene): void => {
+      previews ??= import('./preview-uploads.js').then(
+        ({ PreviewUploads }) => new PreviewUploads({ ...options, onPreview, ready: choosing }),
+      );
+      previews.then((uploads) => uploads.show(preview), ignore);
+    });
+  const endPreviews = (): void => void previews?.then((uploads) => uploads.end(), ignore);
   const device = acquiring.then(async ({ device }) => {
     await choosing.catch(unlessWrong);
     options.signal.throwIfAborted();
@@ -94,7 +111,7 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
     return device;
   });
   const beforeUpload = (byteLength: number): void => {
-    previews?.end();
+    endPreviews();
     options.beforeUpload(byteLength);
   };
   let parts: Promise<PartUploads> | undefined;
@@ -104,7 +121,7 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
     );
     parts.then((uploads) => uploads.add(part), ignore);
   };
-  const loading = options.loader.open(request, abort.signal, options.onProgress, previews?.show, onPart);
+  const loading = options.loader.open(request, abort.signal, options.onProgress, showPreview, onPart);
   try {
     const [lease, scene] = await Promise.all([acquiring, loading, device]);
     if ('frames' in scene) return await openSequence(request, lease, scene, options);
@@ -112,7 +129,7 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
     beforeUpload(sceneBytes(scene.packed));
     return await upload(lease, scene, options);
   } catch (error) {
-    previews?.end();
+    endPreviews();
     parts?.then((uploads) => uploads.destroy(), ignore);
     abort.abort(error);
     acquiring.then((lease) => lease.release(), ignore);

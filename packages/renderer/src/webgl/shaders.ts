@@ -2,7 +2,7 @@
  * Written by `npm run shaders:webgl` from shaders/webgl and shaders/shared, and committed: see scripts/lib/webgl-shaders.mjs. Do not edit.
  */
 /** Digest of the WGSL that this file was generated from. */
-export const SOURCE_DIGEST = 'a1d64f735292d88627a3abeb189503cd';
+export const SOURCE_DIGEST = '477aac2c57d2df1daa73fb579e332488';
 /** Texels in a row of the textures that hold arrays. */
 export const DATA_WIDTH = 4096;
 export const QuadsView = {
