@@ -172,16 +172,11 @@ async function openSequence(
 }
 
 /** Requests device and code concurrently. */
-async function openDynamicScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  const acquiring = options.device.acquire();
-  try {
-    const live = await loadModule('the code that runs generators', () => import('../dynamic/open-dynamic-model.js'));
-    return await live.openDynamicScene(request, options, await acquiring);
-  } catch (error) {
-    acquiring.then((lease) => lease.release(), ignore);
-    throw error;
-  }
-}
+const openDynamicScene = (request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> =>
+  openLate(options, async (lease) => {
+    const late = await loadModule('the code that runs generators', () => import('../dynamic/open-dynamic-model.js'));
+    return late.openDynamicScene(request, options, await lease);
+  });
 
 /**
  * LOD folders are recognized by the name of their manifest, clips by their extension, and streamed SOG by its name,
@@ -192,28 +187,22 @@ export function isStreamed({ url, isWhole }: SceneRequest): boolean {
   return name !== null && !(isWhole && name[2] === 'lod-meta');
 }
 
-async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
-  const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
-  const opening = loadModule('the code that streams scenes', () => import('./open-streamed.js'));
-  const acquiring = options.device.acquire();
-  opening.catch(ignore);
-  const lease = await acquiring;
-  let scene: LoadedGaussians | undefined;
+const openStreamedScene = (request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> =>
+  openLate(options, async (lease) => {
+    const late = await loadModule('the code that streams scenes', () => import('./open-streamed.js'));
+    return late.openStreamedScene(request, options, await lease);
+  });
+
+/** Opens a scene with a lease, which is released if that fails. */
+async function openLate(
+  { device }: OpenOptions,
+  open: (lease: Promise<DeviceLease>) => Promise<LoadedGaussians>,
+): Promise<LoadedGaussians> {
+  const acquiring = device.acquire();
   try {
-    await startVariants(lease.device, pictures()).catch(unlessWrong);
-    limitScenes(lease.device, memoryBudget);
-    const { openStreamed } = await opening;
-    signal.throwIfAborted();
-    const onChange = (): void => scene?.onChange();
-    // The fitting part is determined when the manifest is loaded.
-    beforeUpload(memoryBudget ?? 0);
-    const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
-      ...{ loader, signal, onProgress, memoryBudget, onChange, live: options.live },
-    });
-    scene = new LoadedGaussians(lease, gaussians, bounds, submissions, rest);
-    return scene;
+    return await open(acquiring);
   } catch (error) {
-    lease.release();
+    acquiring.then((lease) => lease.release(), ignore);
     throw error;
   }
 }

@@ -1,14 +1,17 @@
 /** Opens streamed scenes: page by page (docs/lod-format.md), or streamed SOG box by box. */
 import { partRequest } from '@gaussian-splat/core/fetch';
 import { loadModule } from '@gaussian-splat/core';
-import { MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import { MemoryLedger, startVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { SceneWorker, SceneLoader } from '../loading/scene-loader.js';
 import type { ClipPlayer } from '../dynamic/clip-player.js';
 import type { DynamicRequest } from '../dynamic/dynamic-model.js';
 import type { SceneBounds } from '../camera/settings.js';
-import type { OwnedGaussians } from './loaded-gaussians.js';
+import { LoadedGaussians, type OwnedGaussians } from './loaded-gaussians.js';
+import { limitScenes } from './memory-budget.js';
+import { pictures, unlessWrong, type OpenOptions } from './open-scene.js';
+import type { DeviceLease } from './shared-device.js';
 import type { LodSettings } from './backend.js';
 import { streamCaps } from './stream-caps.js';
 
@@ -45,11 +48,7 @@ const DETAIL = 1;
  * Opens a folder by its manifest: fetches that and the coarsest level. Failures of parts are added to `warnings` later.
  * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason.
  */
-export async function openStreamed(
-  request: SceneRequest,
-  device: GPUDevice,
-  options: StreamedOptions,
-): Promise<OpenedStream> {
+async function openStreamed(request: SceneRequest, device: GPUDevice, options: StreamedOptions): Promise<OpenedStream> {
   if (!new URL(request.url).pathname.endsWith('.json')) return openClip(request, device, options);
   const { signal, memoryBudget = Infinity, onChange } = options;
   const caps = streamCaps();
@@ -158,3 +157,24 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
   });
   return StreamedGaussians.openSource(device, source, pool);
 };
+
+/** Opens a streamed scene, which then owns the lease. The caller releases it if this rejects. */
+export async function openStreamedScene(
+  request: SceneRequest,
+  options: OpenOptions,
+  lease: DeviceLease,
+): Promise<LoadedGaussians> {
+  const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions, live } = options;
+  let scene: LoadedGaussians | undefined;
+  await startVariants(lease.device, pictures()).catch(unlessWrong);
+  limitScenes(lease.device, memoryBudget);
+  signal.throwIfAborted();
+  const onChange = (): void => scene?.onChange();
+  // The fitting part is determined when the manifest is loaded.
+  beforeUpload(memoryBudget ?? 0);
+  const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
+    ...{ loader, signal, onProgress, memoryBudget, onChange, live },
+  });
+  scene = new LoadedGaussians(lease, gaussians, bounds, submissions, rest);
+  return scene;
+}
