@@ -1,4 +1,4 @@
-import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
+import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { startVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import type { DynamicRequest } from '../dynamic/dynamic-model.js';
@@ -13,13 +13,13 @@ import type {
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import { LoadedGaussians } from './loaded-gaussians.js';
+import { pictures, unlessWrong } from './initial-frames.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
 import type { PartUploads } from './part-uploads.js';
 import type { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu, why } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 import { shown, upload } from './upload.js';
-import { canvasFormat } from './webgpu-backend.js';
 
 export interface OpenOptions {
   readonly device: SharedDevice;
@@ -205,14 +205,6 @@ async function openLate(
     acquiring.then((lease) => lease.release(), ignore);
     throw error;
   }
-}
-
-/** Format of the canvas. */
-export const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
-
-/** Only a failed self-test aborts loading; failed timings do not. */
-export function unlessWrong(error: unknown): void {
-  if (error instanceof GaussianSplatError && error.code === 'unsupported/wrong-image') throw error;
 }
 
 function ignore(): void {

@@ -10,7 +10,7 @@ import type { DynamicRequest } from '../dynamic/dynamic-model.js';
 import type { SceneBounds } from '../camera/settings.js';
 import { LoadedGaussians, type OwnedGaussians } from './loaded-gaussians.js';
 import { limitScenes } from './memory-budget.js';
-import { pictures, unlessWrong, type OpenOptions } from './open-scene.js';
+import { pictures, unlessWrong } from './initial-frames.js';
 import type { DeviceLease } from './shared-device.js';
 import type { LodSettings } from './backend.js';
 import { streamCaps } from './stream-caps.js';
@@ -161,20 +161,20 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
 /** Opens a streamed scene, which then owns the lease. The caller releases it if this rejects. */
 export async function openStreamedScene(
   request: SceneRequest,
-  options: OpenOptions,
+  options: Omit<StreamedOptions, 'onChange'> & { beforeUpload(byteLength: number): void; readonly submissions: number },
   lease: DeviceLease,
 ): Promise<LoadedGaussians> {
   const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions, live } = options;
-  let scene: LoadedGaussians | undefined;
+  const opened: { scene?: LoadedGaussians } = {};
   await startVariants(lease.device, pictures()).catch(unlessWrong);
   limitScenes(lease.device, memoryBudget);
   signal.throwIfAborted();
-  const onChange = (): void => scene?.onChange();
+  const onChange = (): void => opened.scene?.onChange();
   // The fitting part is determined when the manifest is loaded.
   beforeUpload(memoryBudget ?? 0);
   const { gaussians, bounds, ...rest } = await openStreamed(request, lease.device, {
     ...{ loader, signal, onProgress, memoryBudget, onChange, live },
   });
-  scene = new LoadedGaussians(lease, gaussians, bounds, submissions, rest);
-  return scene;
+  opened.scene = new LoadedGaussians(lease, gaussians, bounds, submissions, rest);
+  return opened.scene;
 }
