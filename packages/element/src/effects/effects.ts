@@ -244,6 +244,8 @@ export class Effects implements Mover {
     this.#refused = null;
     this.#shader = shader;
     if (shader?.animated && !before?.animated) this.#isPlaying = !this.#isReducing;
+    // The button that pauses is rendered before this, in the same update.
+    if (shader?.animated !== before?.animated) this.#host.element.requestUpdate();
     this.#host.requestFrame();
     // Changed values alone need no other program.
     if (shader && before && isSameCode(shader, before)) return;

@@ -219,8 +219,9 @@ export class WebGpuBackend implements Backend {
 
 const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
 
-/** Format of the canvas. */
-export const canvasFormat = (): GPUTextureFormat => navigator.gpu.getPreferredCanvasFormat();
+let format: GPUTextureFormat | undefined;
+/** Format of the canvas. A browser has one; it is read once. */
+export const canvasFormat = (): GPUTextureFormat => (format ??= navigator.gpu.getPreferredCanvasFormat());
 
 const frameOf = ({ surface, ...frame }: CanvasFrame): Frame => ({
   ...frame,
