@@ -117,7 +117,7 @@ fn trim_gaussian(g: ptr<function, Gaussian>, found: Gaussian, c: u32, inside: f3
     let spread = spread_along(found, slab.gradient);
     let limits = limits_of(slab, spread, modifiers.cuts[c].edge);
     let share = normal_below(limits.y) - normal_below(limits.x);
-    // What is left of a point: `base`, and within the limits `weight` more.
+    // Remaining opacity of a point: `base`, and within the limits `weight` more.
     let base = select(1.0, opacity, is_outside);
     let weight = select(-1.0, 1.0, is_outside) * (1.0 - opacity) * min(inside / max(share, 1e-6), 1.0);
     let low = normal_density(limits.x);

@@ -54,7 +54,7 @@ fn compose_colors(k: u32, share: f32) {
   cut_has_color = true;
 }
 
-// Row of the product of a map of colors and the map so far.
+// Row of the product of a map of colors and the map until now.
 fn mapped_row(row: vec4f) -> vec4f {
   return row.x * cut_red + row.y * cut_green + row.z * cut_blue + vec4f(0.0, 0.0, 0.0, row.w);
 }

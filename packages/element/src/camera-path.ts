@@ -17,7 +17,7 @@ export interface PathRequest {
   readonly attributes?: Partial<Record<'cameraOrbit' | 'cameraTarget' | 'fieldOfView' | 'up', string>> & {
     readonly orthographic?: boolean;
   };
-  /** Of the scene, in its own frame: `boundsOf` of its cloud, with the direction that the file names as up. */
+  /** Bounds of the scene in its own frame: `boundsOf` of its cloud, with the up direction of the file. */
   readonly bounds: SceneBounds;
   /** Pixels. */
   readonly width: number;

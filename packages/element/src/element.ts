@@ -409,7 +409,7 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#strings = { ...this.#words, ...strings };
   }
 
-  /** Says everything in the language of the page, as soon as its words are there. */
+  /** Uses the language of the page as soon as its strings are loaded. */
   async #speak(lang: string): Promise<void> {
     const words = /^(en\b|$)/i.test(lang)
       ? {}

@@ -7,9 +7,9 @@ import type { ImageOptions } from './viewing.js';
 import { frameCount, frameShares, type CameraPath, type PathName } from './views/camera-path.js';
 import type { Tour } from './views/tour.js';
 
-/** What a video shows, and for how long. */
+/** Content and duration of a video. */
 interface VideoOptions {
-  /** Where the camera goes: along the list of `views`, or once around its target. Default: where it goes anyway. */
+  /** Path of the camera: through the list of `views`, or once around its target. Default: the camera of the element. */
   readonly path?: PathName;
   /** Milliseconds. Default: what the path says. */
   readonly duration?: number;
@@ -47,7 +47,7 @@ export interface RecordingHost extends PictureHost {
 }
 
 const FRAME_RATE = 30;
-/** Where the browser does not say which. */
+/** Media types in order of preference. */
 const TYPES = ['video/webm;codecs=vp9', 'video/webm', 'video/mp4'];
 
 /** See `record()` of the element. */
@@ -177,7 +177,7 @@ export async function* recordFrames(host: RecordingHost, options: FrameOptions):
   }
 }
 
-/** Waits until the scene of a time is on show. */
+/** Waits until the scene of a time is drawn. */
 async function seek({ element, playback }: RecordingHost, seconds: number): Promise<void> {
   if (playback.currentTime === seconds) return;
   const shown = new Promise((resolve) => element.addEventListener('seeked', resolve, { once: true }));

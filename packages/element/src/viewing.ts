@@ -146,7 +146,7 @@ export abstract class ViewingMethods extends MediaProperties {
   /**
    * A video of what the element shows, recorded by the browser while it happens: of the camera's `path`, for a `duration`, or until the `signal`. The camera comes back afterwards.
    * @returns rejects with an `InvalidStateError` where no scene is shown, with a `NotSupportedError` where the browser does not record this type, and with a `TypeError` without views
-   * to go along, without an end, and for a background that is no color.
+   * to follow, without an end, and for a background that is no color.
    */
   async record(options: RecordOptions = {}): Promise<Blob> {
     return (await this.#images()).record(this.core, options);
@@ -154,7 +154,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /**
    * The same frame by frame, each drawn for its own time however long that takes: `for await (const image of element.recordFrames({ path: 'turntable' }))`. They are the frames of
-   * `gaussian-splat video`. A scene that moves goes on by a frame's time, and has to be in sight.
+   * `gaussian-splat video`. An animated scene advances by the time of a frame, and must be visible.
    */
   async *recordFrames(options: FrameOptions = {}): AsyncGenerator<Blob, void> {
     yield* (await this.#images()).recordFrames(this.core, options);

@@ -1,4 +1,4 @@
-/** What the commands that draw have in common: reading a scene, the renderer that draws it, and its images as files. */
+/** Shared by the commands that draw: reads a scene, opens its renderer and writes its images. */
 import { dirname, join, resolve } from 'node:path';
 import { PNG } from 'pngjs';
 import { SPLAT_FILTERS } from '@gaussian-splat/core';

@@ -4,7 +4,7 @@ import { renameSync, rmSync } from 'node:fs';
 import { extname } from 'node:path';
 import { UsageError } from './command.mjs';
 
-/** What ffmpeg writes, by the extension of the file. */
+/** Arguments of ffmpeg by the extension of the file. */
 const FORMATS = {
   '.mp4': { codec: ['-c:v', 'libx264', '-preset', 'slow', '-movflags', '+faststart'], needsEven: true },
   '.webm': { codec: ['-c:v', 'libvpx-vp9', '-b:v', '0', '-row-mt', '1', '-auto-alt-ref', '0'], hasAlpha: true },
@@ -32,7 +32,7 @@ export function checkVideo(path, width, height) {
 }
 
 /**
- * A video that frames are written to, one after another. Its file is there once it is whole.
+ * A video that frames are written to, one after another. Its file appears once it is whole.
  * @param size.isOpaque all alpha is 1
  */
 export function openVideo(path, { width, height, frameRate, isOpaque }) {
@@ -53,7 +53,7 @@ export function openVideo(path, { width, height, frameRate, isOpaque }) {
       reject(new Error(`ffmpeg ended with ${code}: ${complaint.trim()}`));
     });
   });
-  // Whoever writes next learns of it.
+  // The next write reports it.
   ended.catch(() => undefined);
   program.stdin.on('error', () => undefined);
   return {

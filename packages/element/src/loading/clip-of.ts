@@ -70,7 +70,7 @@ async function readGsvPart(request: ClipRequest, signal: AbortSignal): Promise<C
   return readClipPart({ bytes, part, frames, name: fileName(request.url), limits: limitsFrom(request)() });
 }
 
-/** Told by the extension of its name, as clips are. */
+/** Recognized by the extension of its name, same as clips. */
 const isFourDgs = ({ url }: ClipRequest): boolean => /\.4dgs$/i.test(fileName(url));
 
 /** The file that was opened last: its groups are made one by one. */

@@ -56,7 +56,7 @@ export class MeshLayer {
   readonly #glass = new RenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES });
   readonly #resolve: MeshResolve;
   #depth: { readonly key: readonly unknown[]; readonly ofSplats: SceneDepth } | undefined;
-  /** Of the last frame. */
+  /** The value of the last frame. */
   #drawnFrom: Pick<Camera, 'near' | 'far' | 'orthographic'> = { near: 1, far: Infinity };
   readonly #shown = new Map<Model, Group>();
   readonly #environment: CubeRenderTarget;

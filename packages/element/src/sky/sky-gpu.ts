@@ -6,7 +6,7 @@ import type { Frame } from '../dynamic/frame-filter.js';
 import { viewRays } from './view-rays.js';
 
 const LABEL = 'gs.sky';
-/** Of three.js, and of `<model-viewer>`: the middle of an equirectangular image lies at +x. */
+/** The convention of three.js and `<model-viewer>`: the middle of an equirectangular image lies at +x. */
 const SHADER = /* wgsl */ `
 struct Rays { x: vec4f, y: vec4f, base: vec4f }
 @group(0) @binding(0) var<uniform> rays: Rays;
@@ -99,5 +99,5 @@ export class SkyGpu {
   }
 }
 
-/** What asks for images of splats alone draws no sky. */
+/** Images of splats alone have no sky. */
 export const hasTarget = (frame: Frame): boolean => (frame.target as GPUTexture | undefined) !== undefined;

@@ -14,7 +14,7 @@ import { hasTarget, SkyGpu } from './sky-gpu.js';
 /** Bytes of a file. */
 const MAX_BYTES = 2 ** 26;
 
-/** What a sky asks of its element. */
+/** Interface of the element for a sky. */
 export interface SkyHost {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly attributes: Pick<Attributes, 'skyboxImage' | 'crossorigin'>;

@@ -1,4 +1,4 @@
-/** What a sky is drawn by: the direction in viewer space that each pixel looks in. */
+/** Directions of the pixels' rays in viewer space, which a sky is sampled with. */
 import type { Camera } from '@gaussian-splat/core';
 import type { ViewerFrame } from '../camera/orbit.js';
 

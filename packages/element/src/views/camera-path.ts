@@ -10,7 +10,7 @@ const PART_SECONDS = 3;
 /** Seconds of one turn. */
 const TURN_SECONDS = 8;
 
-/** Where the camera goes: through the views of the list, or once around its target. */
+/** Path of the camera: through the views of the list, or once around its target. */
 export type PathName = 'views' | 'turntable';
 
 export interface CameraPath {
@@ -18,7 +18,7 @@ export interface CameraPath {
   readonly seconds: number;
   /** True for a path that ends where it begins. */
   readonly isClosed: boolean;
-  /** The pose at a share of the path, 0..1. */
+  /** The pose at a fraction of the path, 0..1. */
   at(share: number): CameraPose;
 }
 
@@ -46,7 +46,7 @@ export const turntable = (pose: CameraPose): CameraPath => ({
   at: (share) => ({ ...pose, theta: pose.theta + 2 * Math.PI * share }),
 });
 
-/** Shares of a path at which its frames are: from its beginning to its end, or, of a closed one, to the frame before its beginning. */
+/** Fractions of a path at its frames: from 0 to 1, or, if it is closed, to the frame before its beginning. */
 export function frameShares(frames: number, { isClosed }: Pick<CameraPath, 'isClosed'>): number[] {
   const steps = Math.max(1, isClosed ? frames : frames - 1);
   return Array.from({ length: frames }, (_, frame) => frame / steps);

@@ -335,7 +335,7 @@ export class Tour implements ReactiveController, Mover {
 /** Maximum size of a views file, bytes: it is parsed on the main thread. */
 const MAX_VIEWS = 2 ** 22;
 
-/** Views of children are read anew each time. */
+/** Views of children are read again each time. */
 const isSameList = (a: ViewList, b: ViewList): boolean =>
   a.path === b.path && a.views.length === b.views.length && a.views.every(({ view }, i) => view === b.views[i].view);
 

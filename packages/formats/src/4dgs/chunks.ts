@@ -13,7 +13,7 @@ import {
 } from './streams.js';
 import { Cursor, OPCODE, type FileRecord, type TemporalModel } from './wire.js';
 
-/** What the head of a chunk says. */
+/** Contents of the head of a chunk. */
 export interface Chunk {
   readonly from: number;
   readonly until: number;
@@ -23,7 +23,7 @@ export interface Chunk {
   readonly content: Uint8Array;
   /** Records of spherical harmonics that follow it. */
   readonly bands: Uint8Array[];
-  /** Splats that are there, after its changes. */
+  /** Number of splats after its changes. */
   readonly live: number;
   /** Splats that it says something of. */
   readonly splats: number;
@@ -158,9 +158,9 @@ async function bandsOf(records: readonly Uint8Array[], count: number, decoding: 
   throw damaged(name, `${shDegree} bands of spherical harmonics`, String(records.length), 'decode/header');
 }
 
-/** What a delta may not change: grids depend on it. */
+/** Attributes that a delta may not change, because grids depend on them. */
 const FIXED: readonly AttributeId[] = [ATTRIBUTE.sigma, ATTRIBUTE.flags, ATTRIBUTE.window];
-/** What a delta gives anew; all else is added. */
+/** Attributes that a delta replaces. It adds to all others. */
 const REPLACED: readonly AttributeId[] = [ATTRIBUTE.rotationIndex, ATTRIBUTE.rotation];
 
 async function changedState(before: State, chunk: Chunk, decoding: Decoding): Promise<State> {
@@ -224,7 +224,7 @@ function joined(
 
 const idsOf = (bins: Bins, count: number): number[] => Array.from(bins.get(ATTRIBUTE.id) ?? new Int32Array(count));
 
-/** Rows by the numbers of their splats. */
+/** Rows by the indices of their splats. */
 export function rowsById(bins: Bins, name: string): Map<number, number> {
   const ids = bins.get(ATTRIBUTE.id);
   if (!ids) throw damaged(name, 'numbers of splats', 'none', 'decode/header');

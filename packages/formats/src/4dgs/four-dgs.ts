@@ -13,7 +13,7 @@ const FAR = 1000;
 /** States that are kept, since frames that follow one another need the same. */
 const MOST_STATES = 4;
 
-/** Splats of a moment or a span of time, and the numbers that tell them apart. */
+/** Splats of a moment or a span of time, and the numbers that identify them. */
 export interface Population {
   readonly splats: ChangingSplats;
   /** Absent where splats of other moments are others. */
@@ -174,7 +174,7 @@ function tracksOf(records: readonly { content: Uint8Array }[], name: string): Ma
   return tracks;
 }
 
-/** States of chunks that share no splats. */
+/** States of chunks without common splats. */
 function mergedStates(states: readonly State[], shDegree: number): State {
   if (states.length === 1) return states[0];
   const ids = new Set(states.flatMap(({ bins }) => [...bins.keys()]));

@@ -10,7 +10,7 @@ import { presence, type ChangingSplats } from './splats.js';
 
 export { isFourDgs } from './wire.js';
 
-/** Frames a second, unless the file has states or windows of equal length: then so many of these that there are at least the least. */
+/** Frames a second, unless the file has states or windows of equal length. Then the rate is theirs, multiplied until it reaches the minimum. */
 const [USUAL_RATE, LEAST_RATE, MOST_RATE] = [30, 24, 120];
 /** Frames of a group at most, and what the largest group may take on the GPU before groups become shorter. */
 const GROUP_FRAMES = [15, 8, 4, 2, 1];

@@ -7,12 +7,12 @@ import { product } from './tracks.js';
 /** The same rows at every moment. */
 export interface Moments {
   readonly clouds: readonly GaussianCloud[];
-  /** [rows] of each moment: whether a row is there. Where it is not, its numbers say nothing. */
+  /** [rows] of each moment: whether a row exists. The numbers of one that does not are undefined. */
   readonly isThere: readonly Uint8Array[];
 }
 
 const MOST_CODE = 32_767;
-/** Share of the largest change that counts as none. */
+/** Fraction of the largest change below which a change is ignored. */
 const NOTHING = 1e-6;
 
 /** One base, and for each attribute that changes either one straight line or as many curves as there are moments. */
@@ -59,7 +59,7 @@ function rowsAt(clouds: readonly GaussianCloud[], moments: Uint16Array): Gaussia
   };
 }
 
-/** What an attribute of a row differs by from its base, in the numbers of `Motion`. */
+/** Differences of an attribute of a row from its base, in the numbers of `Motion`. */
 function putChange(
   name: MovingName,
   base: GaussianCloud,
@@ -124,7 +124,7 @@ function partOf(
   return { rank: frames, curves, ...coded(changes, frames) };
 }
 
-/** What a change must exceed to count: positions are rounded to 32 bits. */
+/** Change that is not ignored: positions are rounded to 32 bits. */
 const leastOf = ({ positions }: GaussianCloud, largest: number): number =>
   Math.max(NOTHING * largest, positions.reduce((most, value) => Math.max(most, Math.abs(value)), 0) * 2 ** -22);
 

@@ -138,7 +138,7 @@ function harmonicsFrom(colors: Int32Array, bands: readonly Int32Array[], { heade
   return sh;
 }
 
-/** Share of its opacity that a splat has at a time; 0: it is not there. */
+/** Fraction of its opacity that a splat has at a time; 0 if it does not exist then. */
 export function presence(splats: ChangingSplats, i: number, seconds: number, cutoff: number): number {
   if (!(splats.from[i] <= seconds && seconds < splats.until[i])) return 0;
   if (splats.fades[i] === Infinity) return 1;

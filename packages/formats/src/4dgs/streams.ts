@@ -16,7 +16,7 @@ export const CHANNELS: Readonly<Record<AttributeId, number>> = {
   ...{ 0: 3, 1: 3, 2: 1, 3: 3, 4: 3, 5: 1, 6: 3, 7: 1 },
   ...{ 8: 1, 9: 1, 10: 1, 13: 1, 14: 1 },
 };
-/** What every splat must have. */
+/** Attributes that every splat must have. */
 export const REQUIRED: readonly AttributeId[] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
 
 const MODE = { raw: 0, delta: 1, constant: 2 } as const;

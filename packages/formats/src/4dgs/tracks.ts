@@ -5,7 +5,7 @@ import type { Cursor } from './wire.js';
 
 type Quaternion = readonly [w: number, x: number, y: number, z: number];
 
-/** Where an object is, from where its splats lie. */
+/** Placement of an object, from the positions of its splats. */
 export interface Pose {
   readonly rotation: Quaternion;
   readonly translation: readonly [number, number, number];

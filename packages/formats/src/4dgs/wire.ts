@@ -106,7 +106,7 @@ const MODELS: readonly string[] = ['gaussian-birth', 'keyframe-delta'] satisfies
 export interface Header {
   readonly durationSeconds: number;
   readonly splats: number;
-  /** Splats that fade below this share of their opacity are not drawn. */
+  /** Splats that fade below this fraction of their opacity are not drawn. */
   readonly cutoff: number;
   readonly model: TemporalModel;
   readonly shDegree: ShDegree;
