@@ -35,6 +35,7 @@ ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, [TSC, '--build', ...projects()]);
 writeLicences();
+await writeDecoders();
 if (extent !== 'element') await bundleThreads();
 if (extent !== 'packages') {
   const others = extent === 'whole' ? buildBesideBundle() : undefined;
@@ -55,6 +56,12 @@ async function bundleElement() {
   ]);
   writeLicencesOfBundle();
   console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
+}
+
+/** The decoders of compressed meshes and textures. esbuild was not there when this script started on a fresh clone. */
+async function writeDecoders() {
+  const decoders = await import('../packages/formats/scripts/decoders.mjs');
+  await decoders.writeDecoders();
 }
 
 /** The script of threads that commands start. */
@@ -96,6 +103,11 @@ function writeLicencesOfBundle() {
     ['three.js, in the script that is fetched for meshes', 'node_modules/three/LICENSE'],
     // Its decoder comes with three.js, without a text beside it.
     ['meshoptimizer, in the same', 'packages/element/third-party/meshoptimizer/LICENSE'],
+    ['Draco, in the script that is fetched for meshes with Draco', 'packages/formats/third-party/draco/LICENSE'],
+    [
+      'Basis Universal, in the script that is fetched for KTX2 textures',
+      'packages/formats/third-party/basis-universal/LICENSE',
+    ],
   ].map(textOf);
   // Its npm package has neither.
   const runtime = [

@@ -126,6 +126,13 @@ const copyOthers = {
 const NAMES = { index: 'generator', dist: 'generator', meta: 'sog-meta', lod: 'sog-levels', bundle: 'sog-bundle' };
 const nameOf = ({ name }) => NAMES[name] ?? name;
 
+/** Scripts of one file leave out the decoders of Draco and KTX2, which few pages need: the page has them in chunks. */
+const withoutDecoders = {
+  name: 'without-decoders',
+  load: (id) =>
+    /\/triangles\/(draco|basis)-code\.js$/.test(id) ? `export const create = undefined, wasm = '';` : null,
+};
+
 const output = {
   dir: path('./cdn'),
   format: 'es',
@@ -182,13 +189,13 @@ export default [
   },
   {
     input: path('./dist/loading/scene-worker.js'),
-    plugins,
+    plugins: [withoutDecoders, ...plugins],
     output: { file: path('./dist/loading/scene-worker.bundle.js'), format: 'es', inlineDynamicImports: true },
   },
   {
     // All in one module, for `gaussian-splat page --single`.
     input: path('./dist/index.js'),
-    plugins: [...sources, shortText],
+    plugins: [withoutDecoders, ...sources, shortText],
     output: { file: path('../cli/dist/single.js'), format: 'es', inlineDynamicImports: true },
   },
 ];

@@ -10,6 +10,7 @@ export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { readPrefix } from './read-prefix.js';
 export { MOST_DROPPED, readScene, type ReadSceneOptions } from './read-scene.js';
 export { readTriangles, type TriangleFile, type TriangleSource } from './triangles/read-triangles.js';
+export { Ktx2Decoder } from './triangles/ktx2.js';
 export type { ImageFile } from './triangles/images.js';
 export type { MeshoptView } from './triangles/views.js';
 export { isSequence, MAX_HEADER_BYTES as HEADER_BYTES } from './signatures.js';

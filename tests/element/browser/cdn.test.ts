@@ -112,10 +112,12 @@ describe('the CDN build', () => {
     const textured = await reportOf(`/net/secure-page?mesh=${FIXTURES}textured.glb`);
     assertEqual([textured.loaded, textured.mesh], [true, [true, null]], 'a texture within a GLB');
     assertEqual([textured.violations, textured.warnings], [[], []], 'violations and warnings');
-    const meshopt = await reportOf(`/net/secure-page?wasm&mesh=${FIXTURES}meshopt.glb`);
-    assertEqual([meshopt.mesh, meshopt.violations], [[true, null], []], 'meshopt');
-    const refused = (await reportOf(`/net/secure-page?mesh=${FIXTURES}meshopt.glb`)).mesh as [boolean, string];
-    assert(!refused[0] && /allow 'wasm-unsafe-eval'/i.test(refused[1]), `named where it is refused: ${refused[1]}`);
+    for (const file of ['meshopt.glb', 'draco.glb', 'ktx2.glb']) {
+      const shown = await reportOf(`/net/secure-page?wasm&mesh=${FIXTURES}${file}`);
+      assertEqual([shown.mesh, shown.violations], [[true, null], []], file);
+      const [isShown, message] = (await reportOf(`/net/secure-page?mesh=${FIXTURES}${file}`)).mesh as [boolean, string];
+      assert(!isShown && /allow 'wasm-unsafe-eval'/i.test(message), `${file} is refused by name: ${message}`);
+    }
   });
 
   it("runs a generator there with 'wasm-unsafe-eval', and nothing more", async () => {

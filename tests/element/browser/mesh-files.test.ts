@@ -58,11 +58,30 @@ describe('files of meshes', () => {
     await until(() => textured.loaded || textured.error !== null, 'the textured mesh', 60_000);
     assertEqual(textured.error, null, `${textured.error?.message}`);
     const isDrawn = ([r, g, b]: Rgb): boolean => r + g + b > 60;
-    await comesToShow(textured.parentElement!, (screen) => screen.middleOf(isDrawn) !== null);
+    assert(
+      await comesToShow(textured.parentElement!, (screen) => screen.middleOf(isDrawn) !== null),
+      'the textured mesh is drawn',
+    );
     textured.parentElement!.remove();
     await keep('data.gltf', withBuffer(`data:application/octet-stream;base64,${corners}`));
     assertEqual(await reasonOf(`${FOLDER}data.gltf`), 'shown', 'a buffer in the JSON');
     assertEqual(await reasonOf(`${FIXTURES}meshopt.glb`), 'shown', 'meshopt');
+    assertEqual(await reasonOf(`${FIXTURES}draco.glb`), 'shown', 'Draco');
+  });
+
+  it('textures in KTX2 are shown upright, with their colors', async () => {
+    const mesh = await meshOf(`${FIXTURES}ktx2.glb`);
+    await until(() => mesh.loaded || mesh.error !== null, 'the mesh', 60_000);
+    assertEqual(mesh.error, null, `${mesh.error?.message}`);
+    const most = (channel: number) => (color: Rgb): boolean =>
+      color.every((value, k) => k === channel || value < color[channel] / 2) && color[channel] > 60;
+    const isShown = await comesToShow(mesh.parentElement!, (screen) => {
+      const [red, green, blue] = [0, 1, 2].map((channel) => screen.middleOf(most(channel)));
+      if (!red || !green || !blue) return false;
+      // The first row of the image is its top: red, then green; blue is below red.
+      return red.x < green.x && red.y < blue.y && Math.abs(red.y - green.y) < 10;
+    });
+    assert(isShown, 'red at the top left, green beside it, blue below');
   });
 
   itInLab('ask their own server alone, and those that the page allows', async () => {

@@ -1,7 +1,14 @@
 /** Loaded by the worker for the first mesh. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { partRequest } from '@gaussian-splat/core/fetch';
-import { fetchScene, LoadBudget, readTriangles, type ImageFile, type TriangleFile } from '@gaussian-splat/formats';
+import {
+  fetchScene,
+  Ktx2Decoder,
+  LoadBudget,
+  readTriangles,
+  type ImageFile,
+  type TriangleFile,
+} from '@gaussian-splat/formats';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
 import type { FileRequest, LoadedMesh, ProgressListener } from './protocol.js';
@@ -34,18 +41,23 @@ export async function openMeshFile(
     };
     const file = await readTriangles({ bytes, name, budget, openUri });
     signal.throwIfAborted();
-    return await withBitmaps(file, name, signal);
+    return await withBitmaps(file, { name, budget }, signal);
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
   }
 }
 
-async function withBitmaps(file: TriangleFile, name: string, signal: AbortSignal): Promise<LoadedMesh> {
+async function withBitmaps(
+  file: TriangleFile,
+  { name, budget }: { readonly name: string; readonly budget: LoadBudget },
+  signal: AbortSignal,
+): Promise<LoadedMesh> {
+  const ktx2 = new Ktx2Decoder(budget);
   const bitmaps: (ImageBitmap | undefined)[] = [];
   try {
     for (const [index, image] of file.images.entries()) {
-      bitmaps.push(image && (await decoded(image, `${name}, images[${index}]`)));
+      bitmaps.push(image && (await decoded(image, `${name}, images[${index}]`, ktx2)));
       signal.throwIfAborted();
     }
   } catch (error) {
@@ -56,7 +68,8 @@ async function withBitmaps(file: TriangleFile, name: string, signal: AbortSignal
 }
 
 /** Same as `GLTFLoader`: the values of the file, without a color profile. */
-async function decoded({ bytes, type, width, height }: ImageFile, where: string): Promise<ImageBitmap> {
+async function decoded(image: ImageFile, where: string, ktx2: Ktx2Decoder): Promise<ImageBitmap> {
+  const { bytes, type, width, height } = image;
   const fail = (found: string, cause?: unknown): never => {
     throw new GaussianSplatError('decode/corrupt', {
       where,
@@ -67,7 +80,9 @@ async function decoded({ bytes, type, width, height }: ImageFile, where: string)
     });
   };
   const options: ImageBitmapOptions = { premultiplyAlpha: 'none', colorSpaceConversion: 'none' };
-  const bitmap = await createImageBitmap(new Blob([bytes], { type }), options).catch((cause: unknown) =>
+  const content =
+    type === 'image/ktx2' ? new ImageData(await ktx2.decode(image, where), width, height) : new Blob([bytes], { type });
+  const bitmap = await createImageBitmap(content, options).catch((cause: unknown) =>
     fail((cause as Error).message, cause),
   );
   if (bitmap.width === width && bitmap.height === height) return bitmap;

@@ -1,4 +1,5 @@
 /** Loaded when an element has meshes: three.js is behind this module. */
+import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { MemoryLedger, type GaussianScene } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { limitScenes } from '../gpu/memory-budget.js';
@@ -6,7 +7,7 @@ import { limited, type OpenOptions } from '../gpu/open-scene.js';
 import { assertWebGpu } from '../gpu/request-device.js';
 import type { Timeline } from '../dynamic/dynamic-model.js';
 import type { FileRequest, LoadedMesh, SceneRequest } from '../loading/protocol.js';
-import type { SceneLoader } from '../loading/scene-loader.js';
+import type { SceneLoader, SceneWorker } from '../loading/scene-loader.js';
 import { Model } from './model.js';
 
 /** Fetches a glTF and the files that it names, and checks them. Rejects with GaussianSplatError, or the signal's reason. */
@@ -17,13 +18,16 @@ export function fetchMesh(
   onProgress?: OpenOptions['onProgress'],
 ): Promise<LoadedMesh> {
   const request = { url, credentials, limits };
-  return loader.ask(
-    { type: 'mesh', request },
-    signal,
-    ({ openMeshFile }) => openMeshFile(request, signal, onProgress),
-    { onProgress },
-  );
+  const here = ({ openMeshFile }: SceneWorker): Promise<LoadedMesh> => openMeshFile(request, signal, onProgress);
+  return loader.ask({ type: 'mesh', request }, signal, here, { onProgress }).catch(async (error: unknown) => {
+    // The worker's script of one file, for strict pages of bundlers, has no decoders.
+    if (!isMissingDecoder(error)) throw error;
+    return here(await loadModule('the code that reads meshes', () => import('../loading/scene-worker.js')));
+  });
 }
+
+const isMissingDecoder = (error: unknown): boolean =>
+  error instanceof GaussianSplatError && error.code === 'network/unreachable' && /^the decoder/.test(error.where);
 
 /**
  * Reserves the GPU memory that a mesh takes, and makes its objects. Rejects with GaussianSplatError, or the signal's reason.

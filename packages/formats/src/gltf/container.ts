@@ -62,10 +62,6 @@ const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
     /meshopt/i,
     'write the file again without compression ("gltf-transform copy" decodes meshopt), or convert it to SPZ or PLY',
   ],
-  [
-    /draco|basisu/i,
-    'write the file again with meshopt or without compression, and with PNG, JPEG or WebP textures: neither Draco nor KTX2 is read',
-  ],
   [/spz/i, 'export the scene again with KHR_gaussian_splatting_compression_spz_2, or give the SPZ that it was made of'],
 ];
 

@@ -208,6 +208,22 @@ export class GltfDocument {
     return bytes.subarray(byteOffset, byteOffset + byteLength);
   }
 
+  /**
+   * Gives an accessor a buffer of its own, with a buffer view, as a decoder of an extension does.
+   * @param stride Bytes from one element to the next; undefined for packed elements.
+   */
+  provide(accessor: number, bytes: Uint8Array, stride?: number): void {
+    const { json } = this;
+    const bufferViews = Array.isArray(json.bufferViews) ? (json.bufferViews as unknown[]) : [];
+    const buffers = Array.isArray(json.buffers) ? (json.buffers as unknown[]) : [];
+    json.bufferViews = bufferViews;
+    json.buffers = buffers;
+    this.#buffers.set(buffers.length, Promise.resolve(bytes));
+    Object.assign(this.item('accessors', accessor), { bufferView: bufferViews.length, byteOffset: 0 });
+    bufferViews.push({ buffer: buffers.length, byteLength: bytes.length, byteStride: stride });
+    buffers.push({ byteLength: bytes.length });
+  }
+
   async #loadBuffer(index: number): Promise<Uint8Array> {
     const { uri } = this.item('buffers', index);
     if (uri === undefined) {

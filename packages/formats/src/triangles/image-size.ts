@@ -2,14 +2,14 @@ import { asciiOf, startsWith, viewOf } from '../bytes.js';
 
 /** The header of an image file: its media type and its size in pixels. */
 export interface ImageHeader {
-  readonly type: 'image/png' | 'image/jpeg' | 'image/webp';
+  readonly type: 'image/png' | 'image/jpeg' | 'image/webp' | 'image/ktx2';
   readonly width: number;
   readonly height: number;
 }
 
-/** Reads the header of a PNG, JPEG or WebP image; undefined for other files and for headers without a size. */
+/** Reads the header of a PNG, JPEG, WebP or KTX2 image; undefined for other files and for headers without a size. */
 export function imageHeader(bytes: Uint8Array): ImageHeader | undefined {
-  const found = pngHeader(bytes) ?? jpegHeader(bytes) ?? webpHeader(bytes);
+  const found = pngHeader(bytes) ?? jpegHeader(bytes) ?? webpHeader(bytes) ?? ktx2Header(bytes);
   return found && found.width > 0 && found.height > 0 ? found : undefined;
 }
 
@@ -28,6 +28,18 @@ function pngHeader(bytes: Uint8Array): ImageHeader | undefined {
 
 /** Start-of-frame markers: C0 to CF except the tables (C4), the reserved one (C8) and arithmetic conditioning (CC). */
 const isFrame = (marker: number): boolean => marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker);
+
+const KTX2 = [0xab, 0x4b, 0x54, 0x58, 0x20, 0x32, 0x30, 0xbb, 0x0d, 0x0a, 0x1a, 0x0a];
+
+/** Only for one image of Basis Universal (`VK_FORMAT_UNDEFINED`), as KHR_texture_basisu requires. */
+function ktx2Header(bytes: Uint8Array): ImageHeader | undefined {
+  if (!startsWith(bytes, KTX2) || bytes.length < 80) return undefined;
+  const view = viewOf(bytes);
+  const at = (index: number): number => view.getUint32(12 + 4 * index, true);
+  const [format, , width, height, depth, layers, faces] = [0, 1, 2, 3, 4, 5, 6].map(at);
+  const isPlain = format === 0 && depth === 0 && layers <= 1 && faces === 1;
+  return isPlain ? { type: 'image/ktx2', width, height } : undefined;
+}
 
 function jpegHeader(bytes: Uint8Array): ImageHeader | undefined {
   if (!startsWith(bytes, [0xff, 0xd8, 0xff])) return undefined;

@@ -9,6 +9,7 @@ import type { Survey } from './survey.js';
 
 /** Texture size that every WebGPU device supports. */
 const MAX_SIDE = 8192;
+const IMAGES = 'a PNG, JPEG or WebP image, or a KTX2 image of Basis Universal';
 
 /** An encoded image. */
 export interface ImageFile extends ImageHeader {
@@ -50,8 +51,7 @@ export class Images {
     const path = `images[${index}]`;
     const bytes = await this.#bytesOf(document.item('images', index), path);
     const header = imageHeader(bytes);
-    if (header === undefined)
-      throw damaged(`${document.name}, ${path}`, 'a PNG, JPEG or WebP image', 'another file', 'decode/unsupported');
+    if (header === undefined) throw damaged(`${document.name}, ${path}`, IMAGES, 'another file', 'decode/unsupported');
     const { width, height } = header;
     if (Math.max(width, height) > MAX_SIDE) {
       const expected = `at most ${grouped(MAX_SIDE)} pixels a side`;
@@ -71,17 +71,20 @@ export class Images {
   }
 }
 
-/** The image of a texture: WebP if available, because others are fallbacks for viewers without WebP. */
+/**
+ * The image of a texture: WebP if available, because others are fallbacks for viewers without WebP. KTX2 comes last,
+ * because its fallback needs no decoder.
+ */
 export function sourceOf(document: GltfDocument, index: unknown): number {
   const texture = document.item('textures', index);
   const { extensions, source } = texture;
-  const webp =
-    isObject(extensions) && isObject(extensions.EXT_texture_webp) ? extensions.EXT_texture_webp.source : undefined;
-  const image = webp ?? source;
+  const sourceIn = (name: string): unknown =>
+    isObject(extensions) && isObject(extensions[name]) ? extensions[name].source : undefined;
+  const image = sourceIn('EXT_texture_webp') ?? source ?? sourceIn('KHR_texture_basisu');
   if (document.isIndex(image)) return image;
   throw damaged(
     `${document.name}, textures[${String(index)}]`,
-    'a PNG, JPEG or WebP image',
+    IMAGES,
     isObject(extensions) ? Object.keys(extensions).join(', ').slice(0, 80) : 'none',
     'decode/unsupported',
   );

@@ -4,6 +4,7 @@ import { isPly } from '../signatures.js';
 import { readPlyMesh } from './ply-mesh.js';
 import { openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument, type OpenUri } from '../gltf/document.js';
+import { decodeDraco } from './draco.js';
 import { Images, type ImageFile } from './images.js';
 import { Survey } from './survey.js';
 import { trimmed } from './trim.js';
@@ -41,9 +42,9 @@ export interface TriangleFile {
   readonly warnings: readonly string[];
 }
 
-/** Extensions that a file may require. Draco and KTX2 are not supported. */
+/** Extensions that a file may require. */
 const KNOWN =
-  /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_transform|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_xmp\w*)$/;
+  /^(KHR_mesh_quantization|(EXT|KHR)_meshopt_compression|KHR_draco_mesh_compression|EXT_mesh_gpu_instancing|KHR_lights_punctual|KHR_texture_(transform|basisu)|EXT_texture_webp|KHR_materials_\w+|EXT_materials_\w+|KHR_gaussian_splatting\w*|\w+_xmp\w*)$/;
 
 /**
  * Reads the triangles of a glTF 2.0, GLB or PLY file. Every number that determines an allocation is validated, and
@@ -58,6 +59,7 @@ export async function readTriangles(source: TriangleSource): Promise<TriangleFil
   const document = new GltfDocument(file, { name, budget }, { uri: openUri });
   const survey = new Survey(document);
   if (survey.draws === 0) throw noTriangles(name);
+  await decodeDraco(document, survey);
   const images = new Images(document, survey);
   const views = new Views(document, survey);
   const files = await images.read();

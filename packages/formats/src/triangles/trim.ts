@@ -56,7 +56,8 @@ const nameOf = (name: unknown): string | undefined =>
   typeof name === 'string' ? name.slice(0, NAME_LENGTH) : undefined;
 
 const hasSource = ({ source, extensions }: Json): boolean =>
-  source !== undefined || (isObject(extensions) && isObject(extensions.EXT_texture_webp));
+  source !== undefined ||
+  (isObject(extensions) && (isObject(extensions.EXT_texture_webp) || isObject(extensions.KHR_texture_basisu)));
 
 /**
  * Transform of a node, and its visible content. Skins may refer to nodes outside the scene: only their transform is
