@@ -73,8 +73,10 @@ describe('files of meshes', () => {
     const mesh = await meshOf(`${FIXTURES}ktx2.glb`);
     await until(() => mesh.loaded || mesh.error !== null, 'the mesh', 60_000);
     assertEqual(mesh.error, null, `${mesh.error?.message}`);
-    const most = (channel: number) => (color: Rgb): boolean =>
-      color.every((value, k) => k === channel || value < color[channel] / 2) && color[channel] > 60;
+    const most =
+      (channel: number) =>
+      (color: Rgb): boolean =>
+        color.every((value, k) => k === channel || value < color[channel] / 2) && color[channel] > 60;
     const isShown = await comesToShow(mesh.parentElement!, (screen) => {
       const [red, green, blue] = [0, 1, 2].map((channel) => screen.middleOf(most(channel)));
       if (!red || !green || !blue) return false;

@@ -414,14 +414,15 @@ const ANSWERS = {
       <gaussian-splat src="/tests/element/browser/fixtures/compass.ply" loading="eager" camera-controls></gaussian-splat>`;
   },
 
-  /** The policy that the README recommends, Trusted Types included; `?generator` and `?wasm` add what WebAssembly needs. `?mesh=ADDRESS` shows a mesh, too. */
+  /** The policy that the README recommends, Trusted Types included; `?generator` and `?wasm` add what WebAssembly needs; `?noworker` refuses workers. `?mesh=ADDRESS` shows a mesh, too. */
   'secure-page'(context) {
     const isGenerator = 'generator' in context.query;
     const wasm = isGenerator || 'wasm' in context.query ? " 'wasm-unsafe-eval'" : '';
     const { mesh } = context.query;
+    const worker = 'noworker' in context.query ? "'none'" : "'self'";
     context.set(
       'Content-Security-Policy',
-      `default-src 'none'; script-src 'self'${wasm}; worker-src 'self'; connect-src 'self'; img-src 'self'; style-src 'self'; ` +
+      `default-src 'none'; script-src 'self'${wasm}; worker-src ${worker}; connect-src 'self'; img-src 'self'; style-src 'self'; ` +
         "require-trusted-types-for 'script'; trusted-types lit-html gaussian-splat",
     );
     context.type = 'text/html';
