@@ -10,11 +10,20 @@ const openUri = (): Promise<never> => Promise.reject(new Error('no other files')
 const read = (bytes: Uint8Array, limits: LoadLimits = {}): Promise<TriangleFile> =>
   readTriangles({ bytes, name: 'a.glb', budget: new LoadBudget(bytes.length, limits), openUri });
 
+/** JSON of a fixture, as far as tests change it. */
+interface Changeable {
+  extensionsRequired?: string[];
+  accessors: { count: number; type: string; bufferView?: number }[];
+  bufferViews: { buffer: number; byteLength: number }[];
+  buffers: { byteLength: number }[];
+  meshes: { primitives: { mode: number; extensions: Record<string, unknown> }[] }[];
+}
+
 /** A GLB with other JSON, and other bytes for its only buffer. */
-function glbOf(file: Uint8Array, change: (json: any) => void, binary?: Uint8Array): Uint8Array {
+function glbOf(file: Uint8Array, change: (json: Changeable) => void, binary?: Uint8Array): Uint8Array {
   const view = new DataView(file.buffer);
   const length = view.getUint32(12, true);
-  const json = JSON.parse(new TextDecoder().decode(file.subarray(20, 20 + length)));
+  const json = JSON.parse(new TextDecoder().decode(file.subarray(20, 20 + length))) as Changeable;
   const data = binary ?? file.subarray(28 + length);
   json.buffers[0].byteLength = data.length;
   change(json);
@@ -80,7 +89,7 @@ test('a fallback without an extension needs no decoder', async () => {
     compressed,
     (json) => {
       delete json.extensionsRequired;
-      json.accessors = json.accessors.map((accessor: object) => ({ ...accessor, bufferView: 1 }));
+      json.accessors = json.accessors.map((accessor) => ({ ...accessor, bufferView: 1 }));
       json.bufferViews.push({ buffer: 0, byteLength: 1024 });
       json.accessors[0].count = 3;
       for (const k of [1, 2, 3]) json.accessors[k].count = 8;
