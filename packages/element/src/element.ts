@@ -107,6 +107,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - Fired when the element enters or leaves the viewport.
  * @fires {CustomEvent<ElementError>} generator-error - Fired when a run of the generator fails; the last valid frame stays.
  * @fires {Event} inputs-change - Fired when the set of inputs available to the page changes; `inputs` lists them.
+ * @fires {CustomEvent<GeneratorMemoryDetail>} generator-memory - Fired once before the first run of a generator; `detail` contains the bytes of its weights, of its Gaussians, and of the largest tensor of known size.
  * @fires {CustomEvent<FallbackDetail>} generator-fallback - Fired when the generator runs on the CPU; `detail.reason` contains the reason.
  * @fires {Event} play - Fired when playback is requested, as by HTMLMediaElement; so are the following events.
  * @fires {Event} playing - Fired when playback starts or resumes.

@@ -59,6 +59,21 @@ export interface FallbackDetail {
   readonly reason: string;
 }
 
+/** Memory of a generator that is known before its first run. A run takes more. */
+export interface GeneratorMemoryDetail {
+  /** Bytes of all weights and constants of its models. */
+  readonly weightBytes: number;
+  /**
+   * Bytes of the largest tensor that the nodes compute, among those of known size: a lower bound while `unknownTensors` is
+   * not 0. null if no size is known.
+   */
+  readonly largestKnownTensorBytes: number | null;
+  /** Number of computed tensors whose size only a run determines. */
+  readonly unknownTensors: number;
+  /** Bytes of GPU memory of its Gaussians, which are reserved already. */
+  readonly gaussianBytes: number;
+}
+
 export interface PreviewDetail {
   /** Splats shown. */
   readonly splats: number;
@@ -105,6 +120,8 @@ export interface GaussianSplatEventMap {
   'generator-error': CustomEvent<ElementError>;
   /** Fired when the inputs that the page may set change: see the property `inputs`. */
   'inputs-change': Event;
+  /** Fired once before the first run of a generator, with the memory that is known by then. */
+  'generator-memory': CustomEvent<GeneratorMemoryDetail>;
   /** Fired when the generator runs on the CPU, with the reason. */
   'generator-fallback': CustomEvent<FallbackDetail>;
   /** Loading and playback, same as on HTMLMediaElement. */

@@ -8,6 +8,7 @@ export type {
   CameraChangeDetail,
   CameraChangeSource,
   FallbackDetail,
+  GeneratorMemoryDetail,
   GaussianSplatEventMap,
   HotspotVisibilityDetail,
   LoadDetail,

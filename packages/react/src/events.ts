@@ -18,6 +18,7 @@ const EVENTS = {
   onMeasure: 'measure',
   onModelVisibility: 'model-visibility',
   onGeneratorError: 'generator-error',
+  onGeneratorMemory: 'generator-memory',
   onGeneratorFallback: 'generator-fallback',
   onPlay: 'play',
   onPlaying: 'playing',

@@ -58,9 +58,20 @@ describe('a generator in the element', () => {
     };
     const element = show({ src: BALL });
     const told = watch(element);
+    const memories: object[] = [];
+    let [arrived, arrivedBefore] = [0, NaN];
+    element.addEventListener('progress', (event) => (arrived = event.loaded));
+    element.addEventListener('generator-memory', ({ detail }) => {
+      memories.push({ ...detail, gaussianBytes: detail.gaussianBytes > 0, isLoaded: element.loaded });
+      arrivedBefore = arrived;
+    });
     await element.ready;
     assert(element.loaded, String(element.error?.message));
+    // Sums over the tensors of the file. It comes once.
+    const memory = { weightBytes: 6656, largestKnownTensorBytes: 3328, unknownTensors: 2 };
+    assertEqual(memories, [{ ...memory, gaussianBytes: true, isLoaded: false }], 'memory');
     const [model, runtime] = [await sizeOf(BALL), 'Suspending' in WebAssembly ? 16_758_545 : 26_781_914];
+    assert(arrivedBefore <= model && arrived === model + runtime, `known before the runtime: ${arrivedBefore} bytes`);
     const known = told.filter(({ total }) => total > 0);
     assertEqual([...new Set(known.map(({ total }) => total))], [model + runtime], 'bytes in all');
     const between = known.filter(({ loaded }) => loaded > model + runtime / 10 && loaded < runtime);

@@ -1,4 +1,5 @@
 import { describeTensor, type OnnxHeader } from '../onnx/header.js';
+import { modelMemory } from '../onnx/model-memory.js';
 import { gpuNotes } from '../onnx/webgpu-provider.js';
 import type { Contract, InputBinding } from './contract.js';
 import { tensorNames } from './parse-contract.js';
@@ -30,11 +31,22 @@ function fileRows(header: OnnxHeader): string[][] {
     ['versions', [`IR ${irVersion}`, ...[...opsets].map(([domain, version]) => `${domain} ${version}`)].join(', ')],
     ['operators', used.length > 40 ? `${used.slice(0, 40).join(', ')} and ${used.length - 40} more` : used.join(', ')],
   ];
+  rows.push(['memory', memoryOf(header)]);
   for (const note of gpuNotes(header)) rows.push(['on the GPU', note]);
   for (const { location, byteLength: length } of externalFiles) {
     rows.push(['external data', `${location}${length > 0 ? `, at least ${grouped(length)} bytes` : ''}`]);
   }
   return rows;
+}
+
+/** Bytes of the weights, and of the tensors between nodes as far as the file declares their sizes. */
+function memoryOf(header: OnnxHeader): string {
+  const { weightBytes, largestKnownTensorBytes, unknownTensors } = modelMemory(header);
+  const facts = [`weights ${grouped(weightBytes)} bytes`];
+  if (largestKnownTensorBytes !== null)
+    facts.push(`largest computed tensor of known size ${grouped(largestKnownTensorBytes)} bytes`);
+  if (unknownTensors > 0) facts.push(`${grouped(unknownTensors)} tensors of a size that only a run determines`);
+  return facts.join(', ');
 }
 
 const SOURCES: Readonly<Record<ResolvedContract['source'], string>> = {

@@ -20,6 +20,7 @@ export {
   type GpuFinding,
 } from './webgpu-provider.js';
 export { WEBGPU_RULES } from './webgpu-rules.js';
+export { modelMemory, type ModelMemory } from './model-memory.js';
 export { openHeader, type ModelPlace, type OpenedModel } from './open-header.js';
 export { readOnnxHeader } from './read-onnx-header.js';
 export { openUrl, type UrlSource, type UrlSourceOptions } from './url-source.js';

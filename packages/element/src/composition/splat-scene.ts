@@ -23,6 +23,7 @@ type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
  * @fires {CustomEvent<ElementError>} error - Fired when it cannot be shown; `detail` is the same object as the property
  * `error`. The others stay.
  * @fires {Event} inputs-change - Fired when the inputs that the page may set change; `inputs` contains them.
+ * @fires {CustomEvent<GeneratorMemoryDetail>} generator-memory - Fired once before the first run of its generator; `detail` contains the memory that is known by then.
  * @fires {CustomEvent<ElementError>} generator-error - Fired when a run of its generator fails; the last good frame
  * stays.
  * @fires {ScenePointerEvent} click - With `interactive`: fired when a visitor clicks it, by pointer or key. Bubbles.

@@ -19,8 +19,10 @@ import { RunWatch } from './run-watch.js';
 import { waitForImages, type WaitingPlace } from './wait-for-images.js';
 import type { Vector3 } from '@gaussian-splat/core';
 import type { Contract } from '@gaussian-splat/core/contract';
+import { modelMemory } from '@gaussian-splat/core/onnx';
 import { parseUp } from '../camera/grammar.js';
 import type { SceneBounds } from '../camera/settings.js';
+import type { GeneratorMemoryDetail } from '../events.js';
 
 /** Maximum size of a contract in bytes. */
 const MAX_CONTRACT = 2 ** 20;
@@ -117,6 +119,9 @@ async function openDynamicModel(
       memoryBudget: request.memoryBudget,
     });
     generator.sink = gaussians;
+    request.element.dispatchEvent(
+      new CustomEvent('generator-memory', { detail: memoryOf(models, gaussians.byteLength) }),
+    );
     const { onInput: onChange, onError } = listeners;
     const { credentials } = request;
     const whenIdle = (): Promise<void> => generator.idle;
@@ -158,6 +163,18 @@ async function openDynamicModel(
     gaussians?.destroy();
     throw error;
   }
+}
+
+/** Memory that is known before the first run, over all models of a chain. */
+function memoryOf(models: readonly GeneratorModel[], gaussianBytes: number): GeneratorMemoryDetail {
+  const all = models.map(({ header }) => modelMemory(header));
+  const sizes = all.flatMap(({ largestKnownTensorBytes }) => largestKnownTensorBytes ?? []);
+  return {
+    weightBytes: all.reduce((sum, { weightBytes }) => sum + weightBytes, 0),
+    largestKnownTensorBytes: sizes.length > 0 ? Math.max(...sizes) : null,
+    unknownTensors: all.reduce((sum, { unknownTensors }) => sum + unknownTensors, 0),
+    gaussianBytes,
+  };
 }
 
 function liveModel(
