@@ -23,10 +23,10 @@ export function contractReport(header: OnnxHeader, resolved: ResolvedContract | 
 }
 
 function fileRows(header: OnnxHeader): string[][] {
-  const { byteLength, irVersion, producer, opsets, operators, externalFiles, initializerBytes } = header;
+  const { byteLength, irVersion, producer, opsets, operators, externalFiles } = header;
   const used = [...operators].sort(([a], [b]) => (a < b ? -1 : 1)).map(([name, times]) => `${name} ${times}`);
   const rows = [
-    ['size', `${grouped(byteLength)} bytes, of which ${grouped(initializerBytes)} are weights`],
+    ['size', `${grouped(byteLength)} bytes`],
     ['written by', producer || 'unknown'],
     ['versions', [`IR ${irVersion}`, ...[...opsets].map(([domain, version]) => `${domain} ${version}`)].join(', ')],
     ['operators', used.length > 40 ? `${used.slice(0, 40).join(', ')} and ${used.length - 40} more` : used.join(', ')],
