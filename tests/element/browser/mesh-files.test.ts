@@ -69,6 +69,27 @@ describe('files of meshes', () => {
     assertEqual(await reasonOf(`${FIXTURES}draco.glb`), 'shown', 'Draco');
   });
 
+  itInLab('a worker of one file has no decoders: the page decodes', async () => {
+    const { sceneLoader } = GaussianSplatElement;
+    const refusals: string[] = [];
+    const spawn = (): Worker => {
+      const worker = new Worker('/packages/element/dist/loading/scene-worker.bundle.js', { type: 'module' });
+      worker.addEventListener('message', ({ data }: MessageEvent<{ type: string; error?: { where: string } }>) => {
+        if (data.type === 'error') refusals.push(data.error!.where);
+      });
+      return worker;
+    };
+    GaussianSplatElement.sceneLoader = new (sceneLoader.constructor as new (spawn: () => Worker) => typeof sceneLoader)(
+      spawn,
+    );
+    try {
+      for (const file of ['draco.glb', 'ktx2.glb']) assertEqual(await reasonOf(FIXTURES + file), 'shown', file);
+      assertEqual(refusals, ['the decoder of Draco', 'the decoder of KTX2'], 'refusals of the worker');
+    } finally {
+      GaussianSplatElement.sceneLoader = sceneLoader;
+    }
+  });
+
   it('textures in KTX2 are shown upright, with their colors', async () => {
     const mesh = await meshOf(`${FIXTURES}ktx2.glb`);
     await until(() => mesh.loaded || mesh.error !== null, 'the mesh', 60_000);
