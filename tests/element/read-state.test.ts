@@ -68,3 +68,17 @@ test('a pose is told where no model takes one, once', () => {
   assert.deepEqual(posed.read({ pose: [1, 2, 3] }).pose, [1, 2, 3]);
   assert.deepEqual(posed.told, []);
 });
+
+test('a seed is set like a control: a whole number of 32 bits, or the nearest', () => {
+  const { read, told } = readerOf({ Noise: { role: 'seed' }, amount: control(0, 1) });
+  assert.equal(read({}).seed, undefined);
+  assert.deepEqual(
+    [7, -1, 2.6, 1e12].map((seed) => read({ controls: { noise: [seed] } }).seed),
+    [7, -1, 3, 2 ** 31 - 1],
+  );
+  assert.equal(told.length, 2);
+  assert.match(told[0], /control Noise: expected a whole number from -2147483648 to 2147483647, found 2\.6/);
+  assert.match(told[1], /found 1000000000000/);
+  assert.equal(read({ pictures: { noise: 'much' } }).seed, undefined);
+  assert.match(told[2], /control Noise: expected numbers, found much/);
+});

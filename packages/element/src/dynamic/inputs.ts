@@ -6,7 +6,7 @@ export interface GeneratorInput {
   /** Name as in `inputValues` and `control-NAME`. */
   readonly name: string;
   /**
-   * `control`, `shape`, `image`: set by `control-NAME` or `inputValues`; `pose`: by `pose`; `time`, `frame`: by
+   * `control`, `shape`, `seed`, `image`: set by `control-NAME` or `inputValues`; `pose`: by `pose`; `time`, `frame`: by
    * `currentTime`. Others, such as `view`, are set by the element itself.
    */
   readonly role: Exclude<InputBinding['role'], 'gaussians' | 'depth' | 'state'>;

@@ -4,6 +4,9 @@ import type { GeneratorModel, GeneratorState, GpuTensor } from '@gaussian-splat/
 import type { DynamicState } from './dynamic-model.js';
 import { valueOf } from './values.js';
 
+/** Range of a seed: models take it as int32 or int64. */
+const INT32 = [-(2 ** 31), 2 ** 31 - 1] as const;
+
 /** Converts the state of the page to that of a generator. Invalid values are corrected and reported, each once. */
 export class StateReader {
   readonly #inputs: Contract['inputs'];
@@ -26,16 +29,19 @@ export class StateReader {
     const { timeSeconds, pose } = state;
     const controls: Record<string, number | readonly number[]> = {};
     let shape: readonly number[] | undefined;
+    let seed: number | undefined;
     for (const [name, binding] of Object.entries(this.#inputs)) {
       const value = valueOf(state.controls, name);
       if (binding.role === 'shape') shape = value;
-      if (binding.role !== 'control') continue;
+      if (binding.role !== 'control' && binding.role !== 'seed') continue;
       const picture = valueOf(state.pictures, name);
       if (picture !== undefined) this.#notify(name, 'numbers', String(picture).slice(0, 60), 'its default counts');
-      if (value !== undefined) controls[name] = this.#inRange(name, binding, value);
+      if (value === undefined) continue;
+      if (binding.role === 'seed') seed = this.#wholeNumber(name, value[0]);
+      else controls[name] = this.#inRange(name, binding, value);
     }
     if (others) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.pictures)], others);
-    return { timeSeconds, camera, pose, controls, shape, pictures };
+    return { timeSeconds, camera, pose, controls, shape, seed, pictures };
   }
 
   #inRange(
@@ -50,9 +56,17 @@ export class StateReader {
     return inside.length === 1 ? inside[0] : inside;
   }
 
+  #wholeNumber(name: string, value: number): number {
+    const [least, most] = INT32;
+    const nearest = Math.min(most, Math.max(least, Math.round(value)));
+    if (nearest !== value)
+      this.#notify(name, `a whole number from ${least} to ${most}`, String(value), 'the nearest one counts');
+    return nearest;
+  }
+
   /** Inputs that `control-NAME` sets. */
   get settable(): readonly string[] {
-    const roles = ['control', 'shape', 'image'];
+    const roles = ['control', 'shape', 'seed', 'image'];
     return Object.keys(this.#inputs).filter((name) => roles.includes(this.#inputs[name].role));
   }
 
