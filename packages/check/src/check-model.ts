@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import {
   carriesContract,
   checkContract,
@@ -91,7 +91,7 @@ async function runLocation(location: ModelLocation, header: OnnxHeader, contract
 
 /** Loaded only to run a model, because the runtime is large. */
 async function loadRuntime(): Promise<Runtime> {
-  const ort = await import('onnxruntime-web');
+  const ort = await loadModule('ONNX Runtime', () => import('onnxruntime-web'));
   ort.env.logLevel = 'error';
   ort.env.wasm.numThreads = 1;
   return ort;

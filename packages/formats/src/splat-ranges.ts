@@ -1,7 +1,9 @@
-import { GaussianSplatError, keepUsable, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, keepUsable, loadModule, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { LoadBudget } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
 import { findFormat } from './detect.js';
+import type * as rows from './ply/row-range.js';
+import type * as gltf from './readers/gltf.js';
 import type { SplatRange } from './scene-format.js';
 
 /** Properties of a scene whose splats can be read in ranges, known before they are read. */
@@ -27,9 +29,9 @@ export async function splatRanges(file: FileBytes, name: string): Promise<SplatR
   const source = { bytes, name, budget: new LoadBudget(bytes.length) };
   switch (findFormat(bytes, name, '')?.name) {
     case 'ply':
-      return (await import('./ply/row-range.js')).plyRanges(source);
+      return (await loadRows()).plyRanges(source);
     case 'gltf':
-      return (await import('./readers/gltf.js')).gltfSplats(source);
+      return (await loadGltf()).gltfSplats(source);
   }
 }
 
@@ -45,8 +47,8 @@ export async function readSplats(file: FileBytes, range: SplatRange, name: strin
   const bytes = plainBytes(file, name);
   const source = { bytes, name, range, budget: new LoadBudget(bytes.length) };
   const format = findFormat(bytes, name, '')?.name;
-  if (format === 'ply') return keepUsable(await (await import('./ply/row-range.js')).readPlyRange(source));
-  if (format === 'gltf') return keepUsable(await (await import('./readers/gltf.js')).readGltf(source));
+  if (format === 'ply') return keepUsable(await (await loadRows()).readPlyRange(source));
+  if (format === 'gltf') return keepUsable(await (await loadGltf()).readGltf(source));
   throw new GaussianSplatError('argument/value', {
     where: name,
     expected: 'a PLY or glTF, whose splats can be read a few at a time',
@@ -54,3 +56,8 @@ export async function readSplats(file: FileBytes, range: SplatRange, name: strin
     remedy: 'ask splatRanges first, and call readScene where it answers undefined',
   });
 }
+
+const loadRows = (): Promise<typeof rows> =>
+  loadModule('the code that reads rows of PLY', () => import('./ply/row-range.js'));
+
+const loadGltf = (): Promise<typeof gltf> => loadModule('the code that reads glTF', () => import('./readers/gltf.js'));

@@ -1,5 +1,5 @@
 /** Draws the shadow under the scene; loaded for elements with the attribute `shadow-intensity`. */
-import { eyeOf, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
+import { eyeOf, Lazy, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
 import { GaussianBuffers, type FrameTarget, type Placement, type World } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
@@ -68,6 +68,8 @@ interface Shown {
   remove(): void;
 }
 
+const isGl = ({ place }: Backend): boolean => place.context instanceof WebGL2RenderingContext;
+
 /** Captures images of the scene when it has changed, makes flat splats of them, and puts these under the scene. */
 export class ShadowController implements ReactiveController, Mover {
   readonly #core: ShadowHost;
@@ -77,6 +79,16 @@ export class ShadowController implements ReactiveController, Mover {
   #isBusy = false;
   #notBefore = -Infinity;
   #timer: ReturnType<typeof setTimeout> | undefined;
+  readonly #gl = new Lazy(
+    'the code of shadows',
+    () => import('./gl-shadow.js'),
+    () => this.#core.requestFrame(),
+  );
+  readonly #gpu = new Lazy(
+    'the code of shadows',
+    () => import('./take-alpha.js'),
+    () => this.#core.requestFrame(),
+  );
 
   constructor(core: ShadowHost) {
     this.#core = core;
@@ -109,7 +121,10 @@ export class ShadowController implements ReactiveController, Mover {
     if (key === '') {
       if (this.#shown) this.#core.requestFrame();
       this.#remove();
-    } else if (key !== this.#key && !this.#isBusy) this.#renew(backend, key, now);
+    } else if (key !== this.#key && !this.#isBusy) {
+      const code = isGl(backend) ? this.#gl : this.#gpu;
+      if (code.want((error) => this.#warn(error))) this.#renew(backend, key, now);
+    }
   }
 
   /** Changes whenever the shadow would; empty without a shadow. */
@@ -122,6 +137,10 @@ export class ShadowController implements ReactiveController, Mover {
       return `${scene.count} ${scene.version} ${place} ${visible} ${crop ? [crop.min, crop.max].join() : ''} ${opacity} ${modifier?.version}`;
     });
     return [...places, sources.meshes.value?.version, intensity, softness].join('|');
+  }
+
+  #warn({ message }: Error): void {
+    this.#core.warn(`<gaussian-splat> shadow: ${message}`);
   }
 
   #renew(backend: Backend, key: string, now: number): void {
@@ -138,7 +157,7 @@ export class ShadowController implements ReactiveController, Mover {
     const begin = performance.now();
     this.#make(backend)
       .catch((error: Error) => {
-        if (!backend.isLost && !backend.isDestroyed) this.#core.warn(`<gaussian-splat> shadow: ${error.message}`);
+        if (!backend.isLost && !backend.isDestroyed) this.#warn(error);
       })
       .finally(() => {
         this.#isBusy = false;
@@ -171,11 +190,11 @@ export class ShadowController implements ReactiveController, Mover {
 
   /** Captures images and shows shadows with the painter's own API. */
   async #taker(backend: Backend): Promise<Taker> {
-    if (backend.place.context instanceof WebGL2RenderingContext) {
-      const { glTaker } = await import('./gl-shadow.js');
+    if (isGl(backend)) {
+      const { glTaker } = await this.#gl.get();
       return glTaker(backend as Parameters<typeof glTaker>[0]);
     }
-    const { alphaOfWorld } = await import('./take-alpha.js');
+    const { alphaOfWorld } = await this.#gpu.get();
     const { sources } = this.#core;
     const { device, view } = backend as WebGpuBackend;
     const { take, free } = alphaOfWorld({

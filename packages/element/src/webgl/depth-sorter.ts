@@ -8,15 +8,16 @@ const LATE_MS = 2_000;
 /** The worker that sorts for all scenes of a page. */
 class SortWorker {
   static #current: SortWorker | undefined;
-  /** Rejects if the page forbids workers. */
+  /** Rejects if no worker can be made. */
   readonly ready: Promise<Worker>;
   readonly #spawn: () => Worker;
   #worker: Worker | undefined;
-  #users = 0;
+  /** Callbacks of the users for an error of the worker. */
+  readonly #users = new Set<() => void>();
 
   private constructor(spawn: () => Worker) {
     this.#spawn = spawn;
-    this.ready = new Promise((resolve, reject) => {
+    this.ready = new Promise((resolve) => {
       const worker = (this.#worker = spawn());
       worker.addEventListener('message', ({ data }: MessageEvent<WorkerMessage>) => {
         if (data.type === 'ready') resolve(worker);
@@ -24,22 +25,22 @@ class SortWorker {
       worker.addEventListener('error', (event) => {
         event.preventDefault();
         this.#end();
-        reject(new Error(event.message));
+        for (const onEnd of this.#users) onEnd();
       });
     });
-    this.ready.catch(() => undefined);
   }
 
-  static acquire(spawn: () => Worker): SortWorker {
+  static acquire(spawn: () => Worker, onEnd: () => void): SortWorker {
     const known = this.#current;
     const worker = known && known.#spawn === spawn ? known : new SortWorker(spawn);
     this.#current = worker;
-    worker.#users++;
+    worker.#users.add(onEnd);
     return worker;
   }
 
-  release(): void {
-    if (--this.#users === 0) this.#end();
+  release(onEnd: () => void): void {
+    this.#users.delete(onEnd);
+    if (this.#users.size === 0) this.#end();
   }
 
   #end(): void {
@@ -95,7 +96,7 @@ export class DepthSorter {
   constructor(options: DepthSorterOptions) {
     this.#options = options;
     this.#buffer = this.#makeBuffer();
-    this.#worker = SortWorker.acquire(options.spawn);
+    this.#worker = SortWorker.acquire(options.spawn, this.#giveUp);
     this.#late = setTimeout(this.#giveUp, LATE_MS);
     this.#worker.ready.then((worker) => this.#connect(worker), this.#giveUp);
   }
@@ -122,7 +123,7 @@ export class DepthSorter {
     clearTimeout(this.#late);
     this.#next = undefined;
     this.#port?.close();
-    this.#worker.release();
+    this.#worker.release(this.#giveUp);
   }
 
   #makeBuffer(): Uint32Array<ArrayBuffer> {

@@ -109,9 +109,11 @@ export function runInWorker(
       LIMIT_MS,
     );
     signal.addEventListener('abort', () => end(() => reject(signal.reason as Error)), { once: true });
-    worker.addEventListener('error', (event) =>
-      end(() => reject(new Error(event.message || 'this page lets no worker be started'))),
-    );
+    worker.addEventListener('error', (event) => {
+      // The rejection reports it; without this it would be an uncaught error of the page, too.
+      event.preventDefault();
+      end(() => reject(new Error(event.message || 'this page lets no worker be started')));
+    });
     worker.addEventListener('message', ({ data }: MessageEvent<Answer | { readonly type: 'ready' }>) => {
       if (data.type !== 'ran-on-cpu') return;
       const { outputs, failure } = data;
