@@ -18,6 +18,17 @@ import { comesToShow, isBlue, isGreen, isRed, screenOf } from './support/screen.
 const states = (element: GaussianSplatElement): string[] =>
   ['loading', 'ready', 'error', 'unsupported'].filter((state) => element.matches(`:state(${state})`));
 
+/** The first element that a selector finds in the shadow tree, as it is when it is rendered: no event of the network comes between. */
+const rendered = (element: GaussianSplatElement, selector: string): Promise<Element> =>
+  new Promise((resolve) => {
+    const look = (): void => {
+      const found = element.shadowRoot!.querySelector(selector);
+      if (found) resolve(found);
+    };
+    new MutationObserver(look).observe(element.shadowRoot!, { childList: true, subtree: true });
+    look();
+  });
+
 /** Splats whose colours change a little with the direction: harmonics of degree 1, that 8 bits are enough for. */
 function glossy(): string {
   const numbered = (name: string, count: number): string[] => Array.from({ length: count }, (_, i) => `${name}_${i}`);
@@ -134,9 +145,9 @@ describe('a scene', () => {
     context.fillRect(0, 0, 4, 4);
     const { src, open } = gated('green.splat');
     const element = show({ src, poster: image.toDataURL() }, 'width: 120px; height: 100px; --poster-transition: 0s');
-    await until(() => states(element).includes('loading'), 'the state loading');
-    const bar = element.shadowRoot?.querySelector('[role=progressbar]');
-    assert(bar && !bar.hasAttribute('aria-valuenow'), 'a progress bar without a value');
+    const bar = await rendered(element, '[role=progressbar]');
+    assert(!bar.hasAttribute('aria-valuenow'), 'a progress bar without a value');
+    assert(states(element).includes('loading'), 'the state loading');
     const isSeen = await comesToShow(element, (screen) => isRed(screen.at(60, 50)));
     assert(isSeen && !element.loaded, 'the poster is seen before the scene');
     await until(() => Number(bar.getAttribute('aria-valuenow')) > 0, 'a value in the progress bar');

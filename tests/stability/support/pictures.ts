@@ -11,7 +11,7 @@ export const RASTERIZERS: readonly RasterizerName[] = ['quads', 'tiles'];
 
 /**
  * How stages share their work. Barriers make SwiftShader slow; that both variants draw the same bytes is the concern of
- * tests/golden/variants.test.ts, and whole recipes run with barriers.
+ * tests/golden/variants.lab.test.ts, and whole recipes run with barriers.
  */
 export const THREADS = sized<Threads>('serial', 'parallel');
 

@@ -8,7 +8,7 @@ import { readFileSync } from 'node:fs';
 import type { OracleImage } from '../oracle/blend.js';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
-import { isLab, onlyInFull, onlyInLab } from '../support/extent.js';
+import { isLab, onlyInFull } from '../support/extent.js';
 import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt, resized, room } from '../support/scenes.js';
@@ -84,7 +84,7 @@ async function drawn(
 }
 
 for (const { name, cloud, camera, isCaptured, withoutTiles } of daily) {
-  test(name, { skip: name === 'skull, near' && onlyInLab }, async () => {
+  test(name, async () => {
     const device = await serialDevice();
     const mode = cloud.antialiased ? 'antialiased' : 'classic';
     const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode });

@@ -10,7 +10,7 @@ import { referenceViews } from '../support/cameras.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, describeCloseness, renderCloud } from '../support/compare.js';
 import { hasSharedData, needsSharedData, sharedFile } from '../support/data.js';
-import { isLab, onlyInLab } from '../support/extent.js';
+import { isLab } from '../support/extent.js';
 import { psnr } from '../support/metrics.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
@@ -71,7 +71,7 @@ for (const mode of ['classic', 'antialiased'] as const) {
   });
 }
 
-test('rays that are all parallel', { skip: onlyInLab }, async () => {
+test('rays that are all parallel', async () => {
   const camera = { ...view, orthographic: true, fx: 30, fy: 30 };
   const [found] = await compare('crossing, parallel', crossing(14), camera, [NARROW]);
   assert.ok(found >= 59, `${found} dB`);
@@ -87,7 +87,7 @@ for (const [make, least] of [
   [edgeOnDiscs, 42],
   [room, 40],
 ] as const) {
-  test(`procedural: ${make.name}`, { skip: make !== room && onlyInLab }, async () => {
+  test(`procedural: ${make.name}`, async () => {
     const { name, cloud, cameras } = make();
     const [found] = await compare(name, cloud, resized(cameras[0], 120), [NARROW]);
     assert.ok(found >= least, `${found} dB`);

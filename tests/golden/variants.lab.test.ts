@@ -5,7 +5,7 @@ import { setTimeout as delay } from 'node:timers/promises';
 import { autotune, GaussianBuffers, packGaussians, startVariants, type Variants } from '@gaussian-splat/renderer';
 import { passesSelfTest, mortonOrder, packSpheres, ROUNDS, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
-import { onlyInFull, onlyInLab } from '../support/extent.js';
+import { onlyInFull } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
@@ -143,42 +143,38 @@ function storeOf(entries: Map<string, string>) {
   };
 }
 
-test(
-  'a first picture is drawn with what is likely, if it is right and quick; what is best is looked for in pauses',
-  { skip: onlyInLab },
-  async () => {
-    const entries = new Map<string, string>();
-    const store = storeOf(entries);
-    const device = await deviceLikeAny();
-    let pipelines = 0;
-    const make = device.createComputePipeline.bind(device);
-    device.createComputePipeline = (descriptor) => (pipelines++, make(descriptor));
-    const begun = await startVariants(device, { store, quickMs: Infinity });
-    assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' });
-    assert.equal(new Renderer(device).resolvedSettings.rasterizer, 'tiles');
-    assert.equal(entries.size, 0, 'nothing that was not measured is kept');
-    const atFirst = pipelines;
-    const pauses: (() => void)[] = [];
-    const choosing = autotune(device, { store, pause: () => new Promise((resolve) => pauses.push(resolve)) });
-    await new Promise((resolve) => setTimeout(resolve, 200));
-    assert.equal(pauses.length, 1);
-    assert.equal(pipelines, atFirst, 'nothing goes on before the pause');
-    const letGo = setInterval(() => pauses.pop()?.(), 1);
-    const chosen = await choosing;
-    clearInterval(letGo);
-    await assertSuits(device, chosen);
-    assert.deepEqual(JSON.parse([...entries.values()][0]), chosen);
-    assert.equal(new Renderer(device).resolvedSettings.rasterizer, chosen.rasterizer);
-    assert.ok(pipelines > atFirst);
-    device.destroy();
+test('a first picture is drawn with what is likely, if it is right and quick; what is best is looked for in pauses', async () => {
+  const entries = new Map<string, string>();
+  const store = storeOf(entries);
+  const device = await deviceLikeAny();
+  let pipelines = 0;
+  const make = device.createComputePipeline.bind(device);
+  device.createComputePipeline = (descriptor) => (pipelines++, make(descriptor));
+  const begun = await startVariants(device, { store, quickMs: Infinity });
+  assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' });
+  assert.equal(new Renderer(device).resolvedSettings.rasterizer, 'tiles');
+  assert.equal(entries.size, 0, 'nothing that was not measured is kept');
+  const atFirst = pipelines;
+  const pauses: (() => void)[] = [];
+  const choosing = autotune(device, { store, pause: () => new Promise((resolve) => pauses.push(resolve)) });
+  await new Promise((resolve) => setTimeout(resolve, 200));
+  assert.equal(pauses.length, 1);
+  assert.equal(pipelines, atFirst, 'nothing goes on before the pause');
+  const letGo = setInterval(() => pauses.pop()?.(), 1);
+  const chosen = await choosing;
+  clearInterval(letGo);
+  await assertSuits(device, chosen);
+  assert.deepEqual(JSON.parse([...entries.values()][0]), chosen);
+  assert.equal(new Renderer(device).resolvedSettings.rasterizer, chosen.rasterizer);
+  assert.ok(pipelines > atFirst);
+  device.destroy();
 
-    const later = await deviceLikeAny();
-    const pause = () => assert.fail('nothing is looked for');
-    assert.deepEqual(await startVariants(later, { store, quickMs: 0, pause }), chosen, 'what an earlier visit found');
-    assert.deepEqual(await autotune(later, { store, pause }), chosen);
-    later.destroy();
-  },
-);
+  const later = await deviceLikeAny();
+  const pause = () => assert.fail('nothing is looked for');
+  assert.deepEqual(await startVariants(later, { store, quickMs: 0, pause }), chosen, 'what an earlier visit found');
+  assert.deepEqual(await autotune(later, { store, pause }), chosen);
+  later.destroy();
+});
 
 test('what is likely is not drawn with where it is slow', { skip: onlyInFull }, async () => {
   const device = await deviceLikeAny();
