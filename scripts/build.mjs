@@ -26,7 +26,7 @@ const SCRIPTS = [
 ];
 
 /** Texts of ONNX Runtime and of what is in it, as its releases bring them. */
-const RUNTIME_LICENCES = 'packages/element/third-party/onnxruntime';
+const RUNTIME_LICENSES = 'packages/element/third-party/onnxruntime';
 
 const extent = ['element', 'packages'].find((name) => process.argv.includes(`--${name}`)) ?? 'whole';
 
@@ -34,7 +34,7 @@ const noteBuilt = beginBuild(extent);
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, [TSC, '--build', ...projects()]);
-writeLicences();
+writeLicenses();
 await writeDecoders();
 if (extent !== 'element') await bundleThreads();
 if (extent !== 'packages') {
@@ -54,7 +54,7 @@ async function bundleElement() {
     'packages/element/rollup.config.mjs',
     '--silent',
   ]);
-  writeLicencesOfBundle();
+  writeLicensesOfBundle();
   console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
 }
 
@@ -86,7 +86,7 @@ function projects() {
 }
 
 /** npm takes a licence from the package's own folder only. */
-function writeLicences() {
+function writeLicenses() {
   for (const name of readdirSync(join(root, 'packages'))) {
     const folder = join(root, 'packages', name);
     if (existsSync(join(folder, 'package.json'))) copyFileSync(join(root, 'LICENSE'), join(folder, 'LICENSE'));
@@ -94,7 +94,7 @@ function writeLicences() {
 }
 
 /** The bundle is without comments, and the licences of what is in it ask for their text. */
-function writeLicencesOfBundle() {
+function writeLicensesOfBundle() {
   const own = readFileSync(join(root, 'LICENSE'), 'utf8');
   const textOf = ([what, file]) => `${what}\n\n${readFileSync(join(root, file), 'utf8')}`;
   const others = [
@@ -111,8 +111,8 @@ function writeLicencesOfBundle() {
   ].map(textOf);
   // Its npm package has neither.
   const runtime = [
-    ['ONNX Runtime', `${RUNTIME_LICENCES}/LICENSE`],
-    ['What ONNX Runtime is made of', `${RUNTIME_LICENCES}/ThirdPartyNotices.txt`],
+    ['ONNX Runtime', `${RUNTIME_LICENSES}/LICENSE`],
+    ['What ONNX Runtime is made of', `${RUNTIME_LICENSES}/ThirdPartyNotices.txt`],
   ].map(textOf);
   const cdn = join(root, 'packages/element/cdn');
   writeFileSync(join(cdn, 'LICENSES.txt'), [`gaussian-splat\n\n${own}`, ...others].join('\n\n'));

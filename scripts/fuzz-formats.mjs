@@ -22,6 +22,6 @@ for (const [name, files] of scenes) {
   const codes = Object.entries(tally.codes).map(([code, count]) => `${code} ${count}`);
   console.log(
     `${name.padEnd(14)} ${tally.files} files in ${((performance.now() - start) / 1000).toFixed(0)} s: ${tally.read} read, ${tally.refused} refused ` +
-      `(${codes.join(', ')}); slowest ${tally.slowestMs.toFixed(0)} ms, most ${(tally.mostBytes / 1e6).toFixed(1)} MB`,
+      `(${codes.join(', ')}); slowest ${tally.slowestMs.toFixed(0)} ms, most ${(tally.maxBytes / 1e6).toFixed(1)} MB`,
   );
 }

@@ -12,7 +12,7 @@ import { root } from './lib/run.mjs';
 import { serve } from '../packages/cli/src/lib/server.mjs';
 
 /** A picture of a whole document would be too tall to look at. */
-const MOST_PIXELS_DOWN = 6000;
+const MAX_PIXELS_DOWN = 6000;
 
 const { values } = parseArgs({
   options: {
@@ -48,7 +48,7 @@ async function picture(tab, url, width) {
   const overflow = await tab.evaluate(() => document.documentElement.scrollWidth - innerWidth);
   if (overflow > 0) console.log(`${url} at ${width}: ${overflow} pixels too wide`);
   const name = `${url.replace(/^\/|\/$|\.html$/g, '').replaceAll('/', '-') || 'index'}-${width}-${values.scheme}.png`;
-  const clip = { x: 0, y: 0, width, height: Math.min(height, MOST_PIXELS_DOWN) };
+  const clip = { x: 0, y: 0, width, height: Math.min(height, MAX_PIXELS_DOWN) };
   await tab.screenshot({ path: join(values.out, name), ...(values.first ? {} : { fullPage: true, clip }) });
   await tab.close();
 }

@@ -20,9 +20,9 @@ import { serve } from '../packages/cli/src/lib/server.mjs';
 const { values } = parseArgs({
   options: { firefox: { type: 'string', default: 'firefox-esr' }, 'chromium-only': { type: 'boolean' } },
 });
-const LEAST_DB = 45;
-const MOST_AGE_MS = 100;
-const MOST_BYTES = 30_000;
+const MIN_DB = 45;
+const MAX_AGE_MS = 100;
+const MAX_BYTES = 30_000;
 const MODES = ['classic', 'antialiased'];
 
 const server = await serve({
@@ -42,7 +42,7 @@ let failures = 0;
 await inChromium((evaluate, version) => checkAll(`Chromium ${version} (SwiftShader)`, evaluate));
 if (!values['chromium-only'])
   await withDisplay((env) => inFirefox((evaluate, version) => checkAll(`Firefox ${version}`, evaluate), env));
-check('bytes of code', `${bytesOfCode()} bytes of gzip`, bytesOfCode() <= MOST_BYTES);
+check('bytes of code', `${bytesOfCode()} bytes of gzip`, bytesOfCode() <= MAX_BYTES);
 server.closeAllConnections();
 server.close();
 console.log(failures === 0 ? 'All well.' : `${failures} failed.`);
@@ -76,7 +76,7 @@ async function checkAll(browser, evaluate) {
     const found = Float32Array.from(Buffer.from(pixels, 'base64'), (byte) => byte / 255);
     const decibels = psnr(found, toRgba(oracle), { mask: oracle.contributors, channels: 4, clamp: true });
     const times = `frame ${frameMs.toFixed(0)} ms, sort ${sortMs.toFixed(1)} ms`;
-    check(`${view.name} ${mode}`, `${decibels.toFixed(1)} dB, ${format}, ${times}`, decibels >= LEAST_DB);
+    check(`${view.name} ${mode}`, `${decibels.toFixed(1)} dB, ${format}, ${times}`, decibels >= MIN_DB);
   }
   const told = await evaluate(
     `show({ src: '/scenes/skull.spz', 'camera-controls': '' }).then((element) => JSON.stringify([element.stats.renderer, element.loaded, !!navigator.gpu]))`,
@@ -88,7 +88,7 @@ async function checkAll(browser, evaluate) {
   check(
     `orders in motion, ${ages.splats} splats`,
     `median ${ages.median.toFixed(0)} ms, at most ${ages.most.toFixed(0)} ms old (${ages.frames} frames); ${rates}`,
-    ages.most <= MOST_AGE_MS,
+    ages.most <= MAX_AGE_MS,
   );
 }
 

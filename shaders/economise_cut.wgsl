@@ -12,7 +12,7 @@ struct Cut {
   min_contribution: f32,
   removal_price: f32,
   // Mean squared error that storing one coefficient is worth.
-  colour_price: f32,
+  color_price: f32,
 }
 
 @group(0) @binding(0) var<uniform> cut: Cut;
@@ -41,11 +41,11 @@ fn coefficients(degree: u32) -> u32 {
 // The degree that minimizes the error plus the price of the kept coefficients.
 fn degree_of(i: u32) -> u32 {
   var best = cut.sh_degree;
-  if (cut.colour_price <= 0.0) { return best; }
+  if (cut.color_price <= 0.0) { return best; }
   let record = i * lowered_numbers(cut.sh_degree, cut.sh_degree);
-  var least = cut.colour_price * f32(coefficients(best));
+  var least = cut.color_price * f32(coefficients(best));
   for (var degree = 0u; degree < cut.sh_degree; degree++) {
-    let cost = lowered[record + degree] + cut.colour_price * f32(coefficients(degree));
+    let cost = lowered[record + degree] + cut.color_price * f32(coefficients(degree));
     if (cost > least) { continue; }
     best = degree;
     least = cost;
@@ -65,7 +65,7 @@ fn lowered_number(first: u32, n: u32, numbers: u32) -> f32 {
   return nearest_half(lowered[first + n]);
 }
 
-fn write_colour(i: u32, degree: u32) {
+fn write_color(i: u32, degree: u32) {
   let words = 2u * sh_stride(cut.sh_degree, SH_FLOAT16);
   let first = words * i;
   if (degree == cut.sh_degree) {
@@ -92,7 +92,7 @@ fn apply(i: u32) {
   cut_gaussians[i] = g;
   let degree = degree_of(i);
   choices[i] = degree;
-  write_colour(i, degree);
+  write_color(i, degree);
   atomicAdd(&kept_here[degree], 1u);
 }
 

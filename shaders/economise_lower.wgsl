@@ -15,7 +15,7 @@ struct Lowering {
   // Number of imagined views, spread over all directions, that are added to the real ones.
   prior_views: f32,
   // Minimum of views that must contain a splat before it is scored.
-  least_looks: u32,
+  min_looks: u32,
 }
 
 @group(0) @binding(0) var<uniform> lowering: Lowering;
@@ -31,7 +31,7 @@ const PI = 3.14159265358979;
 // Stands for "no bound", because WGSL has no infinity.
 const UNJUDGED = 3e38;
 // Directions that no view covers stay unchanged: their pivot is below this fraction of the diagonal.
-const LEAST_PIVOT = 1e-6;
+const MIN_PIVOT = 1e-6;
 
 var<private> own: array<vec3f, MAX_COEFFICIENTS>;
 var<private> shift: array<vec3f, MAX_COEFFICIENTS>;
@@ -62,7 +62,7 @@ fn factorise(size: u32) {
         let pivot = matrix[at(column, column)];
         matrix[place] = select(0.0, sum / max(pivot, 1e-37), pivot > 0.0);
       } else {
-        matrix[place] = select(0.0, sqrt(max(sum, 0.0)), sum > LEAST_PIVOT * whole);
+        matrix[place] = select(0.0, sqrt(max(sum, 0.0)), sum > MIN_PIVOT * whole);
       }
     }
   }
@@ -122,7 +122,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let i = group_index(workgroup_id) * SCORE_GROUP + lane;
   if (i >= lowering.splat_count) { return; }
   let s = scores[i];
-  let is_judged = s.looks >= lowering.least_looks;
+  let is_judged = s.looks >= lowering.min_looks;
   scores[i].contribution = select(1.0, s.contribution, is_judged);
   scores[i].removal = select(UNJUDGED, lowering.contrast * s.removal, is_judged);
   if (lowering.sh_degree == 0u) { return; }

@@ -5,7 +5,7 @@
 // (antialiased bilinear); texels outside the image have no weight. Depth is that of the nearest texel: a mean of two
 // surfaces lies on neither.
 @group(0) @binding(0) var<uniform> image: ImageToTensor;
-@group(0) @binding(1) var picture: texture_2d<f32>;
+@group(0) @binding(1) var source: texture_2d<f32>;
 // float32, or two float16 in each word.
 @group(0) @binding(2) var<storage, read_write> tensor: array<u32>;
 
@@ -28,7 +28,7 @@ const IMAGE_GROUP = 64u;
 fn mean(at: vec2u, channel: u32) -> f32 {
   let center = image.corner + (vec2f(at) + 0.5) * image.step;
   let radius = max(image.step, vec2f(1.0));
-  let last = vec2i(textureDimensions(picture)) - 1;
+  let last = vec2i(textureDimensions(source)) - 1;
   let first_tap = max(vec2i(floor(center - radius - 0.5)) + 1, vec2i(0));
   let last_tap = min(vec2i(ceil(center + radius - 0.5)) - 1, last);
   var sum = 0.0;
@@ -37,7 +37,7 @@ fn mean(at: vec2u, channel: u32) -> f32 {
     for (var x = first_tap.x; x <= last_tap.x; x++) {
       let distance = abs(vec2f(f32(x), f32(y)) + 0.5 - center) / radius;
       let weight = (1.0 - distance.x) * (1.0 - distance.y);
-      sum += weight * textureLoad(picture, vec2i(x, y), 0)[channel];
+      sum += weight * textureLoad(source, vec2i(x, y), 0)[channel];
       weights += weight;
     }
   }
@@ -46,8 +46,8 @@ fn mean(at: vec2u, channel: u32) -> f32 {
 
 fn nearest(at: vec2u) -> f32 {
   let center = vec2i(floor(image.corner + (vec2f(at) + 0.5) * image.step));
-  let last = vec2i(textureDimensions(picture)) - 1;
-  return textureLoad(picture, clamp(center, vec2i(0), last), 0).x;
+  let last = vec2i(textureDimensions(source)) - 1;
+  return textureLoad(source, clamp(center, vec2i(0), last), 0).x;
 }
 
 fn element(index: u32) -> f32 {

@@ -1,5 +1,5 @@
 // Copies an image to a target of the same size and any renderable color format.
-@group(0) @binding(0) var picture: texture_2d<f32>;
+@group(0) @binding(0) var source: texture_2d<f32>;
 
 @vertex
 fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
@@ -9,5 +9,5 @@ fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
-  return textureLoad(picture, vec2u(position.xy), 0);
+  return textureLoad(source, vec2u(position.xy), 0);
 }

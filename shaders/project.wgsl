@@ -39,8 +39,8 @@ fn depth_key(depth: f32) -> u32 {
 // If the splats cover the image more often than the limit allows, drops those that cover more than an equal portion, so
 // that the rest stays within the limit.
 fn is_left_out(e: Ellipse) -> bool {
-  if (cull_stats[COVERED] <= view.most_covered) { return false; }
-  let part = f32(COVERED_UNIT) * f32(view.most_covered) / f32(max(plan.visible, 1u));
+  if (cull_stats[COVERED] <= view.max_covered) { return false; }
+  let part = f32(COVERED_UNIT) * f32(view.max_covered) / f32(max(plan.visible, 1u));
   return f32(covered_share(view, e, covered_box(view, e))) > part;
 }
 

@@ -134,7 +134,7 @@ fn depth_of(key: u32) -> f32 {
 }
 
 // Key and color of splat k of the batch at a pixel.
-fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
+fn found_at(k: u32, place: vec2f, min_power: f32) -> vec2u {
   let axis = axes[k];
   let paint = paints[k];
   let u = axis.x * place.x + axis.y;
@@ -149,7 +149,7 @@ fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
   let steps = min((max(bitcast<u32>(depth), first_depth) - first_depth) >> step_bits, DEPTH_MASK);
   let alpha = min(ALPHA_MAX, exp2(power));
   let key = (steps << ALPHA_BITS) | whole(alpha * f32(ALPHA_MASK));
-  let is_seen = power >= least_power && (!tests_depth || layers > 0u || depth <= limit);
+  let is_seen = power >= min_power && (!tests_depth || layers > 0u || depth <= limit);
   return vec2u(select(0u, key, is_seen), paint.z);
 }
 
@@ -176,7 +176,7 @@ fn order_two_apart(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<functi
 }
 
 // Compares places 1 and 2, 3 and 4, 5 and 6, 7 and 8 of twelve.
-fn order_neighbours(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<function, Four>) {
+fn order_neighbors(p: ptr<function, Four>, q: ptr<function, Four>, r: ptr<function, Four>) {
   var near = Four(vec4u((*p).key.yw, (*q).key.yw), vec4u((*p).color.yw, (*q).color.yw));
   var far = Four(
     vec4u((*p).key.z, (*q).key.xz, (*r).key.x), vec4u((*p).color.z, (*q).color.xz, (*r).color.x),
@@ -207,7 +207,7 @@ fn sort_eight(p: ptr<function, Four>, q: ptr<function, Four>) {
   put_in_order(p, q);
   var last = LAST;
   order_two_apart(p, q, &last);
-  order_neighbours(p, q, &last);
+  order_neighbors(p, q, &last);
 }
 
 // Merges eight sorted splats into sixteen sorted ones; the nearest eight are returned in order. An odd-even merge of 45
@@ -232,9 +232,9 @@ fn merge_into(
   order_two_apart(&a, &b, &c);
   order_two_apart(&c, &d, &e);
   order_two_apart(&e, &f, &last);
-  order_neighbours(&a, &b, &c);
-  order_neighbours(&c, &d, &e);
-  order_neighbours(&e, &f, &last);
+  order_neighbors(&a, &b, &c);
+  order_neighbors(&c, &d, &e);
+  order_neighbors(&e, &f, &last);
   *p = a;
   *q = b;
   *w = c;
@@ -293,29 +293,29 @@ fn find_next(walk: ptr<function, Walk>, own_block: u32) {
   }
 }
 
-fn next_found(walk: ptr<function, Walk>, own_block: u32, place: vec2f, least_power: f32) -> vec2u {
+fn next_found(walk: ptr<function, Walk>, own_block: u32, place: vec2f, min_power: f32) -> vec2u {
   find_next(walk, own_block);
   let ahead = (*walk).ahead;
   let k = select(NO_SPLAT, ((*walk).next_word - 1u) * 32u + zeros_below(ahead), ahead != 0u);
   (*walk).ahead = ahead & (ahead - 1u);
-  return found_at(k, place, least_power);
+  return found_at(k, place, min_power);
 }
 
-fn next_four(walk: ptr<function, Walk>, own_block: u32, place: vec2f, least_power: f32) -> Four {
-  let a = next_found(walk, own_block, place, least_power);
-  let b = next_found(walk, own_block, place, least_power);
-  let c = next_found(walk, own_block, place, least_power);
-  let d = next_found(walk, own_block, place, least_power);
+fn next_four(walk: ptr<function, Walk>, own_block: u32, place: vec2f, min_power: f32) -> Four {
+  let a = next_found(walk, own_block, place, min_power);
+  let b = next_found(walk, own_block, place, min_power);
+  let c = next_found(walk, own_block, place, min_power);
+  let d = next_found(walk, own_block, place, min_power);
   return Four(vec4u(a.x, b.x, c.x, d.x), vec4u(a.y, b.y, c.y, d.y));
 }
 
-fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, least_power: f32) {
+fn paint_batch(pixel: ptr<function, Pixel>, own_block: u32, place: vec2f, min_power: f32) {
   var walk = Walk(0u, 0u);
   loop {
     find_next(&walk, own_block);
     if (walk.ahead == 0u || are_finished(*pixel)) { break; }
-    var p = next_four(&walk, own_block, place, least_power);
-    var q = next_four(&walk, own_block, place, least_power);
+    var p = next_four(&walk, own_block, place, min_power);
+    var q = next_four(&walk, own_block, place, min_power);
     sort_eight(&p, &q);
     // Splats leave the window sorted at its near end; new ones are inserted at their depth.
     merge_into(&p, &q, &window_0, &window_1, &window_2, &window_3);

@@ -19,9 +19,9 @@ const PATCH = 16u;
 // Splats in each batch.
 const BACKWARD_BATCH = 128u;
 // Clamp of the difference of a channel, so that outliers do not dominate.
-const MOST_DIFFERENCE = 0.0625;
+const MAX_DIFFERENCE = 0.0625;
 // Clamp of one pixel's number of steps: 256 of them fit an i32.
-const MOST_FIXED = 8388607.0;
+const MAX_FIXED = 8388607.0;
 
 var<workgroup> slots: array<u32, BACKWARD_BATCH>;
 var<workgroup> shapes: array<vec4f, BACKWARD_BATCH>;
@@ -31,7 +31,7 @@ var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
 
 fn add_fixed(k: u32, number: u32, value: f32) {
-  atomicAdd(&sums[k * SCREEN_NUMBERS + number], i32(clamp(round(value * FIXED), -MOST_FIXED, MOST_FIXED)));
+  atomicAdd(&sums[k * SCREEN_NUMBERS + number], i32(clamp(round(value * FIXED), -MAX_FIXED, MAX_FIXED)));
 }
 
 // Adds the sum of a patch; at most 65,536 of them fit.
@@ -110,7 +110,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let expected = textureLoad(reference, position, 0);
     let painted = textureLoad(image, position, 0).xyz;
     pixel.is_finished = expected.w == 0.0;
-    pixel.slope = 2.0 * clamp(painted - expected.xyz, vec3f(-MOST_DIFFERENCE), vec3f(MOST_DIFFERENCE));
+    pixel.slope = 2.0 * clamp(painted - expected.xyz, vec3f(-MAX_DIFFERENCE), vec3f(MAX_DIFFERENCE));
     pixel.behind = painted;
   }
   var list = begin_list(bin.y * view.bins.x + bin.x);

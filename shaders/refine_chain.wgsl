@@ -13,7 +13,7 @@
 // SCREEN_NUMBERS of each splat, in fixed point; cleared afterwards for the next view.
 @group(0) @binding(4) var<storage, read_write> screen: array<vec2i>;
 @group(0) @binding(5) var<storage, read_write> gradients: array<f32>;
-// The largest curvatures of each splat in any view: see BEND_COLOUR.
+// The largest curvatures of each splat in any view: see BEND_COLOR.
 @group(0) @binding(6) var<storage, read_write> bends: array<vec4f>;
 
 // A splat with an eye within this many of its sizes is not moved. Derivatives do not include the cost of a step there:
@@ -30,7 +30,7 @@ fn row_of(i: u32) -> u32 {
   return i * (SH_AT + 3u * (view.sh_degree + 1u) * (view.sh_degree + 1u));
 }
 
-fn chain_colour(i: u32, position: vec3f, by_color: vec3f) {
+fn chain_color(i: u32, position: vec3f, by_color: vec3f) {
   let first = row_of(i) + SH_AT;
   let degree = degrees[i];
   let count = (degree + 1u) * (degree + 1u);
@@ -74,7 +74,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     screen[at] = vec2i(0);
   }
   if (!is_seen) { return; }
-  chain_colour(i, position, vec3f(seen[0], seen[1], seen[2]));
+  chain_color(i, position, vec3f(seen[0], seen[1], seen[2]));
 
   let to_camera = mat3x3f(view.local_to_camera[0].xyz, view.local_to_camera[1].xyz, view.local_to_camera[2].xyz);
   p.z = max(p.z, view.near);
@@ -120,13 +120,13 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   // Transposes rows to columns: by each axis of the splat, in the scene.
   let by_axes = transpose(mat3x3f(by_a0, by_a1, by_a2));
   var turns: array<vec3f, 3>;
-  var most_shift = 0.0;
+  var max_shift = 0.0;
   for (var k = 0u; k < 3u; k++) {
     let shift = to_camera * own.axes[k] * stride[k] / p.z;
     let on_screen = (shift.xy - xy * shift.z) * view.focal;
     let in_ellipse = vec2f(x * on_screen.x, lean * on_screen.x + y * on_screen.y);
     // Bound by Cauchy-Schwarz: the derivative by u is u times the one by the logarithm of alpha, the one by a size u².
-    most_shift = max(most_shift, dot(in_ellipse, in_ellipse) * sqrt(seen[10] * seen[11]) + shift.z * shift.z * seen[11]);
+    max_shift = max(max_shift, dot(in_ellipse, in_ellipse) * sqrt(seen[10] * seen[11]) + shift.z * shift.z * seen[11]);
     add(i, k, stride[k] * dot(own.axes[k], by_position));
     add(i, GROWTH_STEP + k, dot(axes[k], by_axes[k]));
     turns[k] = own.scales[k] * (transpose(own.axes) * (transpose(to_camera) * by_axes[k]));
@@ -138,6 +138,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let opacity = 1.0 / (1.0 + exp(-numbers[n + LOGIT_AT]));
   add(i, LOGIT_STEP, seen[3] * (1.0 - opacity));
   let bases = f32((degrees[i] + 1u) * (degrees[i] + 1u)) / FOUR_PI;
-  let bend = vec4f(bases * seen[9], (1.0 - opacity) * (1.0 - opacity) * seen[10], seen[11], most_shift);
+  let bend = vec4f(bases * seen[9], (1.0 - opacity) * (1.0 - opacity) * seen[10], seen[11], max_shift);
   bends[i] = max(bends[i], 2.0 * refine_view.weight / BEND_UNIT * bend);
 }

@@ -16,7 +16,7 @@ struct RefineStep {
   mean_scale: f32,
   square_scale: f32,
   // Epsilon: derivatives far below it change little.
-  least: f32,
+  epsilon: f32,
   // Limit of a step as a fraction of Newton's step along one parameter, computed with the largest curvature in any
   // view.
   newton: f32,
@@ -36,10 +36,10 @@ struct RefineStep {
 @group(0) @binding(3) var<storage, read_write> gradients: array<f32>;
 // Running means of the derivatives, and of their squares.
 @group(0) @binding(4) var<storage, read_write> means: array<vec2f>;
-// The largest curvatures of each splat in any view: see BEND_COLOUR.
+// The largest curvatures of each splat in any view: see BEND_COLOR.
 @group(0) @binding(5) var<storage, read> bends: array<vec4f>;
 
-const LEAST_BEND = 1e-30;
+const MIN_BEND = 1e-30;
 
 // Length of the step along one parameter.
 fn stride_along(i: u32, number: u32, rate: f32, bend: u32) -> f32 {
@@ -49,7 +49,7 @@ fn stride_along(i: u32, number: u32, rate: f32, bend: u32) -> f32 {
   let old = means[at];
   let mean = mix(vec2f(g, g * g), old, vec2f(step.keep_mean, step.keep_square));
   means[at] = mean;
-  let pace = min(rate / (sqrt(mean.y * step.square_scale) + step.least), step.newton / max(LEAST_BEND, bends[i][bend]));
+  let pace = min(rate / (sqrt(mean.y * step.square_scale) + step.epsilon), step.newton / max(MIN_BEND, bends[i][bend]));
   return -mean.x * step.mean_scale * pace;
 }
 
@@ -87,6 +87,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let kept = 3u * (degree + 1u) * (degree + 1u);
   for (var k = 0u; k < kept; k++) {
     let rate = select(step.harmonic_rate, step.constant_rate, k < 3u);
-    numbers[n + SH_AT + k] += stride_along(i, SH_STEP + k, rate, BEND_COLOUR);
+    numbers[n + SH_AT + k] += stride_along(i, SH_STEP + k, rate, BEND_COLOR);
   }
 }

@@ -70,12 +70,12 @@ export function decibels(a, b) {
 }
 
 /** Fewest pixels of a picture: what is smaller has all its splats in a tile or two, and takes the longer for it. */
-const LEAST_PIXELS = 128 ** 2;
+const MIN_PIXELS = 128 ** 2;
 
 /** Pixels of a picture that takes a time, by what two sizes took (`fixed + perPixel * pixels`). */
 export function pixelsFor(milliseconds, [a, b], most) {
   const perPixel = (b.milliseconds - a.milliseconds) / (b.pixels - a.pixels);
   if (!(perPixel > 0)) return most;
   const fixed = b.milliseconds - perPixel * b.pixels;
-  return Math.max(LEAST_PIXELS, Math.min(most, (milliseconds - fixed) / perPixel));
+  return Math.max(MIN_PIXELS, Math.min(most, (milliseconds - fixed) / perPixel));
 }

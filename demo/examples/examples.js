@@ -53,7 +53,7 @@ function conductTime(card) {
 }
 
 /** Pairs of pictures, with what their cameras have to do with one another: `view.json` beside them. */
-async function conductPictures(card) {
+async function conductImages(card) {
   const element = card.querySelector('gaussian-splat');
   const buttons = [...card.querySelectorAll('[data-pair]')];
   const choose = async (chosen) => {
@@ -106,9 +106,9 @@ function conductWalker(card, joints) {
 
 /** Seconds for one round about the plinth, and how far from its middle. */
 const ROUND_SECONDS = 14;
-const ROUND_METRES = 1.35;
+const ROUND_METERS = 1.35;
 /** Its middle is above its feet. */
-const HIP_METRES = 0.83;
+const HIP_METERS = 0.83;
 
 /** The avatar walks around among a scene and a mesh. */
 async function conductRound(card) {
@@ -119,7 +119,7 @@ async function conductRound(card) {
   let [frame, seconds, last] = [0, 0, 0];
   const put = () => {
     const angle = (2 * Math.PI * seconds) / ROUND_SECONDS;
-    walker.position = [ROUND_METRES * Math.sin(angle), HIP_METRES, ROUND_METRES * Math.cos(angle)];
+    walker.position = [ROUND_METERS * Math.sin(angle), HIP_METERS, ROUND_METERS * Math.cos(angle)];
     walker.rotation = [0, angle + Math.PI / 2, 0];
     walker.pose = walkingPose(joints, seconds * PACES_PER_SECOND);
   };
@@ -175,7 +175,7 @@ function showModel(card) {
 
 for (const name of ['sequence', 'plant']) conductTime(exampleOf(name));
 conductRound(exampleOf('together')).catch((error) => console.error(error));
-conductPictures(exampleOf('statue')).catch((error) => console.error(error));
+conductImages(exampleOf('statue')).catch((error) => console.error(error));
 for (const card of document.querySelectorAll('[data-example]')) {
   if (card.dataset.facts) showFile(card);
   else showModel(card);

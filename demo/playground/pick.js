@@ -1,7 +1,7 @@
 /** Points of a scene that a visitor clicks on. */
 
 /** A press that moves farther than this, in CSS pixels, turned the scene and points at nothing. */
-const MOST_MOTION = 5;
+const MAX_MOTION = 5;
 
 /**
  * @param scene {HTMLElement} a `<gaussian-splat>` whose scene is shown
@@ -19,7 +19,7 @@ export function pickPoint(scene, signal) {
     scene.addEventListener(
       'click',
       ({ clientX, clientY }) => {
-        if (Math.hypot(clientX - pressed.x, clientY - pressed.y) > MOST_MOTION) return;
+        if (Math.hypot(clientX - pressed.x, clientY - pressed.y) > MAX_MOTION) return;
         done.abort();
         scene.positionFromPoint(clientX, clientY).then(resolve, reject);
       },

@@ -58,7 +58,7 @@ function knotAt(share) {
     cloud.positions.set(point, 3 * i);
     cloud.scales.set([0.06, 0.045, 0.03], 3 * i);
     cloud.rotations.set(turnTo(tangent), 4 * i);
-    cloud.sh.set(colourAt(along, around, wave), 3 * i);
+    cloud.sh.set(colorAt(along, around, wave), 3 * i);
   }
   return cloud;
 }
@@ -81,7 +81,7 @@ const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b
 const turnTo = ([x, y, z]) => normalized([1 + x + 1e-6, 0, -z, y]);
 
 /** Constant coefficients of a warm colour that goes to blue along the knot, lighter on top and where the wave is. */
-function colourAt(along, around, wave) {
+function colorAt(along, around, wave) {
   const share = 0.5 + 0.5 * Math.sin(along);
   const light = 0.62 + 0.28 * Math.sin(around) + 0.18 * wave;
   const [from, to] = [

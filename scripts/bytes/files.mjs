@@ -43,7 +43,7 @@ export function halfTurned(cloud) {
 
 export async function read(path) {
   const openPart = async (part) => new Uint8Array(readFileSync(join(path, '..', part)));
-  return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openPart });
+  return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openFile: openPart });
 }
 
 /** The least of three times, ms, and what was read. */

@@ -7,7 +7,7 @@ import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf } from '@gaussian-splat/core';
 import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/economise';
-import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
+import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
@@ -140,7 +140,7 @@ for (const key of ['data', 'work', 'out']) values[key] = resolve(process.env.INI
 mkdirSync(values.work, { recursive: true });
 const adapter = await requestNodeAdapter({ isTrusted: true });
 const device = await adapter.requestDevice(deviceDescriptor(adapter));
-await startVariants(device, { format: 'rgba8unorm' });
+await pickInitialVariants(device, { format: 'rgba8unorm' });
 const json = join(values.out, 'bytes.json');
 const before = existsSync(json) ? JSON.parse(readFileSync(json, 'utf8')).scenes : [];
 const scenes = [];

@@ -11,7 +11,7 @@ import { resolveContract } from '@gaussian-splat/core/contract';
 import { bytesSource, readOnnxHeader } from '@gaussian-splat/core/onnx';
 import { codeSequence, encodingsFor } from '@gaussian-splat/economise';
 import { bindInputs } from '@gaussian-splat/generator';
-import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
+import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { walkingPose } from '../../demo/examples/poses.js';
 import { deflate, deflateQuickly, encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
@@ -89,7 +89,7 @@ async function openFrame(frame) {
 
 const adapter = await requestNodeAdapter({ isTrusted: true });
 const device = await adapter.requestDevice(deviceDescriptor(adapter));
-await startVariants(device, { format: 'rgba8unorm' });
+await pickInitialVariants(device, { format: 'rgba8unorm' });
 const frameCount = Number(values.frames);
 const framesPerFile = Number(values['per-file']);
 const options = { frameCount, openFrame, framesPerFile, minDecibels: Number(values['min-db']), device };

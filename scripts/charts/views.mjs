@@ -4,7 +4,7 @@ import { Viewpoint, World } from '@gaussian-splat/renderer';
 import { AuxiliaryOutputs } from '@gaussian-splat/renderer/tools';
 
 /** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits. */
-const LEAST_WEIGHT = 0.5 / 255;
+const MIN_WEIGHT = 0.5 / 255;
 
 export const numbers = (list) => list.split(',').map(Number);
 
@@ -65,7 +65,7 @@ export async function draw(device, gaussians, camera, detail = 0) {
     pixels.set(rows.subarray(start, start + 4 * width), 4 * width * y);
   }
   [target, contributions, viewpoint].forEach((resource) => resource.destroy());
-  return { pixels, visible, contributing: weights.reduce((sum, weight) => sum + (weight >= LEAST_WEIGHT ? 1 : 0), 0) };
+  return { pixels, visible, contributing: weights.reduce((sum, weight) => sum + (weight >= MIN_WEIGHT ? 1 : 0), 0) };
 }
 
 /** Mean squared difference over the pixels that the first picture covers. */

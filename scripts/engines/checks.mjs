@@ -8,13 +8,13 @@ import { findChromium, SWIFTSHADER_FLAGS } from '../lib/chromium.mjs';
 import { root } from '../lib/run.mjs';
 
 /** What pictures on the screen may differ by from Chromium's: both have been rounded to 8 bits twice, by us and by the compositor. */
-const LEAST_DB = 57;
+const MIN_DB = 57;
 const SIZE = { width: 300, height: 240 };
 /** Pages of the site that visitors see first, and those of frameworks. */
 const PAGES = ['/', '/gallery/', '/react/', '/vue/'];
 
 /** A check that takes longer has failed: pages that wait for ever tell nothing. */
-const MOST_MS = 240_000;
+const MAX_MS = 240_000;
 
 let failures = 0;
 
@@ -26,7 +26,7 @@ export async function check(name, body) {
   const start = performance.now();
   try {
     const late = new Promise((_, reject) => {
-      setTimeout(() => reject(new Error(`not done after ${MOST_MS / 1000} s`)), MOST_MS).unref();
+      setTimeout(() => reject(new Error(`not done after ${MAX_MS / 1000} s`)), MAX_MS).unref();
     });
     const found = await Promise.race([body(), late]);
     console.log(`ok      ${name}${found ? `: ${found}` : ''} (${Math.round(performance.now() - start)} ms)`);
@@ -57,12 +57,12 @@ export async function withSite(body) {
 
 /** Scenes on the screen, against Chromium's pictures by the same renderer. @param gaps dB by name, where an engine is known to differ */
 export async function checkScenes(tab, origin, scenes, gaps = {}) {
-  const expected = await picturesOfChromium(origin, scenes);
+  const expected = await imagesOfChromium(origin, scenes);
   for (const [name, attributes] of Object.entries(scenes)) {
     await check(`${name}, against Chromium`, async () => {
       await tab.evaluate(drawing(attributes));
       const decibels = psnr(await tab.screenshot(SIZE), expected[name]);
-      const least = gaps[name] ?? LEAST_DB;
+      const least = gaps[name] ?? MIN_DB;
       assert(decibels >= least, `${decibels.toFixed(1)} dB, expected at least ${least}`);
       return `${decibels.toFixed(1)} dB`;
     });
@@ -238,7 +238,7 @@ function drawing(attributes) {
   return `show(${JSON.stringify({ ...attributes, loading: 'eager' })}).then(() => delay(${rest}))`;
 }
 
-async function picturesOfChromium(origin, scenes) {
+async function imagesOfChromium(origin, scenes) {
   const browser = await chromium.launch({ executablePath: findChromium(), args: SWIFTSHADER_FLAGS });
   try {
     const page = await browser.newPage();

@@ -7,7 +7,7 @@ const RADIUS = 7;
 /** Points nearer than this in both directions are one to the eye. */
 const SAME = 4;
 /** Names that a label has room for. */
-const MOST_NAMES = 3;
+const MAX_NAMES = 3;
 
 /** Where a label may stand, as directions from its point; the nearer ones first. */
 const DIRECTIONS = [
@@ -76,8 +76,8 @@ function together(points) {
   }
   return groups.map((group) => {
     const names = group.map(({ text }) => text);
-    const more = names.length - MOST_NAMES;
-    const text = more > 1 ? `${names.slice(0, MOST_NAMES).join(', ')} and ${more} more` : names.join(', ');
+    const more = names.length - MAX_NAMES;
+    const text = more > 1 ? `${names.slice(0, MAX_NAMES).join(', ')} and ${more} more` : names.join(', ');
     return { ...group[0], text };
   });
 }

@@ -16,7 +16,7 @@ import {
   packGaussians,
   Viewpoint,
   World,
-  startVariants,
+  pickInitialVariants,
 } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { halfTurned, make, own, read, readFolder, timed, TRANSFORM } from '../bytes/files.mjs';
@@ -199,7 +199,7 @@ async function judge(scene, { source, cameras, images, leftOut }, device) {
 
 const adapter = await requestNodeAdapter({ isTrusted: true });
 const device = await adapter.requestDevice(deviceDescriptor(adapter));
-await startVariants(device, { format: 'rgba8unorm' });
+await pickInitialVariants(device, { format: 'rgba8unorm' });
 const scenes = [];
 for (const [name, scene] of Object.entries(SCENES)) {
   if (!existsSync(join(values.data, scene.source))) console.log(`${name}: not in ${values.data}`);

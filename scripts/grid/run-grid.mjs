@@ -16,8 +16,8 @@ const USAGE = `usage: npm run lab:grid -- [--seconds N (default 60)] [--renderer
 
 Ends with an error if the GPU's memory exceeds 1.2 times that of the scenes in view, if a task works and waits for the GPU for more than 50 ms, or if a scene does not come.`;
 const COUNT = 12;
-const MOST_SHARE = 1.2;
-const MOST_TASK_MS = 50;
+const MAX_SHARE = 1.2;
+const MAX_TASK_MS = 50;
 /** Moves of a finger in one swipe. */
 const STEPS = 15;
 const { values } = parseArgs({
@@ -90,7 +90,7 @@ async function scroll() {
     if (atEnd || Math.random() < 0.2) await page.evaluate('grid.settled()');
     resident.push((await residentBytes(processes))?.['GPU'] ?? 0);
   }
-  const tasks = longTasksOf(await browser.stopTracing(), MOST_TASK_MS);
+  const tasks = longTasksOf(await browser.stopTracing(), MAX_TASK_MS);
   const report = await page.evaluate('grid.report()');
   await context.close();
   return { ...report, tasks, resident: Math.max(...resident) };
@@ -113,9 +113,9 @@ function judge({ samples, longTasks, tasks, errors, loaded, resident }) {
   const most = (of) => Math.max(...samples.map(of));
   const peak = most(({ own, canvasBytes }) => own + canvasBytes);
   const share = peak / most(({ needed }) => needed);
-  if (!(share <= MOST_SHARE)) failures.push(`${share.toFixed(2)} times the memory of the scenes in view`);
-  const own = tasks.filter(({ cpuMs, gpuMs }) => cpuMs + gpuMs > MOST_TASK_MS);
-  if (own.length > 0) failures.push(`${own.length} tasks of more than ${MOST_TASK_MS} ms`);
+  if (!(share <= MAX_SHARE)) failures.push(`${share.toFixed(2)} times the memory of the scenes in view`);
+  const own = tasks.filter(({ cpuMs, gpuMs }) => cpuMs + gpuMs > MAX_TASK_MS);
+  if (own.length > 0) failures.push(`${own.length} tasks of more than ${MAX_TASK_MS} ms`);
   failures.push(...errors);
   if (loaded < COUNT) failures.push(`${loaded} of ${COUNT} scenes came`);
   const megabytes = (bytes) => Math.round(bytes / 1e5) / 10;

@@ -25,7 +25,7 @@ export function runAsync(command, args, { env = {}, isBeside = false } = {}) {
     const end = (status) => {
       const text = Buffer.concat(chunks).toString();
       if (isBeside) process.stdout.write(text);
-      resolve({ text: withoutColours(text), status: status ?? 1 });
+      resolve({ text: withoutColors(text), status: status ?? 1 });
     };
     child.on('error', () => end(1)).on('close', end);
   });
@@ -40,6 +40,6 @@ function giveWay(pid) {
   }
 }
 
-function withoutColours(text) {
+function withoutColors(text) {
   return text.replace(/\u001b\[[0-9;]*[A-Za-z]/g, '');
 }

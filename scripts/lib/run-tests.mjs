@@ -5,7 +5,7 @@ import { root, TSC } from './run.mjs';
 import { byGroup, byProcess } from './test-files.mjs';
 
 /** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
-const MOST_UNSTEADY = 3;
+const MAX_UNSTEADY = 3;
 const IN_ONE_PROCESS = 'tests/support/in-one-process.ts';
 const TYPES = [TSC, '--noEmit', '--project', 'tests'];
 const ESLINT = ['node_modules/eslint/bin/eslint.js', '.'];
@@ -93,7 +93,7 @@ async function runBrowser(groups, options, failsUnsteady) {
   const failed = results.flatMap(({ group, failedIn }) =>
     [...failedIn].map(([file, count]) => ({ group, file, count })),
   );
-  if (failed.length > MOST_UNSTEADY) return results;
+  if (failed.length > MAX_UNSTEADY) return results;
   for (const { group, file, count } of failed) {
     const again = await inChromium(group === 'dense' ? group : 'timing', [file], options);
     if (again.failed > 0) continue;

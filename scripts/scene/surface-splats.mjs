@@ -10,9 +10,9 @@ import { writeSpz } from '../../packages/economise/src/write/spz.ts';
 
 const [source, out, least = '0.015', contrast = '7'] = process.argv.slice(2);
 /** Longest edge of a triangle that is divided no further, world units; and the spread of colours, of 255, within one that is. */
-const [LEAST_EDGE, CONTRAST] = [Number(least), Number(contrast)];
+const [MIN_EDGE, CONTRAST] = [Number(least), Number(contrast)];
 /** No splat is longer: it would show as a blob. */
-const MOST_EDGE = 0.3;
+const MAX_EDGE = 0.3;
 /** Standard deviations of a uniform triangle are too small for their Gaussians to close the surface. */
 const SPREAD = 1.9;
 const THICKNESS = 0.002;
@@ -101,7 +101,7 @@ function textureOf(texture, attributes) {
 }
 
 /** The colour of a triangle's point, of 255. Without a texture it is white. */
-function colourAt({ base }, weights) {
+function colorAt({ base }, weights) {
   if (base === undefined) return [255, 255, 255];
   const { image, at } = base;
   const place = (axis, size) => {
@@ -119,7 +119,7 @@ function sampled(triangle) {
   const shares = [
     [1 / 3, 1 / 3, 1 / 3], [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8], [0.45, 0.45, 0.1], [0.1, 0.45, 0.45], [0.45, 0.1, 0.45],
   ]; // prettier-ignore
-  return shares.map((each) => colourAt(triangle, mix(each)));
+  return shares.map((each) => colorAt(triangle, mix(each)));
 }
 
 function divided(triangle) {
@@ -134,7 +134,7 @@ function divided(triangle) {
       (c) => Math.max(...colours.map((colour) => colour[c])) - Math.min(...colours.map((colour) => colour[c])),
     ),
   );
-  if (longest <= LEAST_EDGE || (spread <= CONTRAST && longest <= MOST_EDGE)) return [{ points, colour: mean(colours) }];
+  if (longest <= MIN_EDGE || (spread <= CONTRAST && longest <= MAX_EDGE)) return [{ points, colour: mean(colours) }];
   // In two, at the middle of the longest edge: no part becomes a sliver.
   const k = edges.indexOf(longest);
   const [a, b, c] = [k, (k + 1) % 3, (k + 2) % 3];

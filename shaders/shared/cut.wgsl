@@ -4,9 +4,9 @@
 #import shared/modifiers
 
 // Less of the variance of a splat than this is never kept.
-const LEAST_VARIANCE = 0.01;
+const MIN_VARIANCE = 0.01;
 // Less of a splat than this is not seen.
-const LEAST_MASS = 0.004;
+const MIN_MASS = 0.004;
 
 // Cumulative distribution function of the normal distribution (Abramowitz and Stegun 7.1.26), to 1e-7.
 fn normal_below(x: f32) -> f32 {
@@ -124,7 +124,7 @@ fn trim_gaussian(g: ptr<function, Gaussian>, found: Gaussian, c: u32, inside: f3
     let high = normal_density(limits.y);
     let mean = weight * limits.z * (low - high) / mass;
     let second = (base + weight * (share + limits.z * limits.z * (limits.x * low - limits.y * high))) / mass;
-    let kept = clamp(second - mean * mean, LEAST_VARIANCE, 1.0);
+    let kept = clamp(second - mean * mean, MIN_VARIANCE, 1.0);
     let u = mean * spread / max(length(spread), 1e-30);
     (*g).position += u.x * found.factor_x + vec3f(0.0, u.y * found.factor_y) + vec3f(0.0, 0.0, u.z * found.factor_z);
     narrow_gaussian(g, slab.gradient, kept);

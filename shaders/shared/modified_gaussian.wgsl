@@ -71,7 +71,7 @@ fn apply_cuts(g: ptr<function, Gaussian>) {
     if (share <= 0.0) { continue; }
     if (modifiers.cuts[k].has_color != 0u) { compose_colors(k, share); }
     let mass = mix(1.0, modifiers.cuts[k].opacity, share);
-    if (share < 1.0 && mass < 1.0 && mass > LEAST_MASS && modifiers.cuts[k].edge >= 0.0) {
+    if (share < 1.0 && mass < 1.0 && mass > MIN_MASS && modifiers.cuts[k].edge >= 0.0) {
       trim_gaussian(g, found, k, inside);
     } else {
       (*g).opacity *= mass;

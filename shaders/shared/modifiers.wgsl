@@ -2,8 +2,8 @@
 // block-local coordinates.
 #import shared/view
 
-const MOST_CUTS = 16u;
-const MOST_VALUES = 8u;
+const MAX_CUTS = 16u;
+const MAX_VALUES = 8u;
 // Shapes of a cut, in their own coordinates: sides and diameters are 1, and the plane is y = 0.
 const CUT_BOX = 0u;
 const CUT_SPHERE = 1u;
@@ -59,8 +59,8 @@ struct Modifiers {
   moves: u32,
   reserved_a: u32,
   reserved_b: u32,
-  values: array<vec4f, MOST_VALUES>,
-  cuts: array<ModifierCut, MOST_CUTS>,
+  values: array<vec4f, MAX_VALUES>,
+  cuts: array<ModifierCut, MAX_CUTS>,
 }
 
 @group(0) @binding(9) var<uniform> modifiers: Modifiers;

@@ -37,13 +37,13 @@ fn are_finished(pixels: Pixels) -> bool {
 
 // Blends splat k of the batch. It has no branch, which would take a third more time: splats that miss the pixel and
 // finished pixels add zero.
-fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, least_power: f32) {
+fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, min_power: f32) {
   let axis = axes[k];
   let paint = paints[k];
   let u = axis.x * place.x + axis.y;
   let v = axis.w * (place.y + STEPS) + (axis.z * place.x + bitcast<f32>(paint.x));
   let power = (bitcast<f32>(paint.y) - u * u) - v * v;
-  let alpha = select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(least_power));
+  let alpha = select(Column(0.0), min(Column(ALPHA_MAX), exp2(power)), power >= Column(min_power));
   hide(pixels, k);
   let before = (*pixels).light;
   let full_weight = before * alpha;
@@ -60,7 +60,7 @@ fn blend(pixels: ptr<function, Pixels>, k: u32, place: vec2f, least_power: f32) 
   (*pixels).transmittance = select((*pixels).transmittance, after, is_blended);
 }
 
-fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, least_power: f32) {
+fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, min_power: f32) {
   for (var word = 0u; word < BATCH_WORDS; word++) {
     if (are_finished(*pixels)) { break; }
     // Visits those of these 32 splats that touch the block, two at a time: the second is loaded while the first is
@@ -71,8 +71,8 @@ fn paint_batch(pixels: ptr<function, Pixels>, own_block: u32, place: vec2f, leas
       ahead &= ahead - 1u;
       let next = select(NO_SPLAT, word * 32u + zeros_below(ahead), ahead != 0u);
       ahead &= ahead - 1u;
-      blend(pixels, k, place, least_power);
-      blend(pixels, next, place, least_power);
+      blend(pixels, k, place, min_power);
+      blend(pixels, next, place, min_power);
     }
   }
 }

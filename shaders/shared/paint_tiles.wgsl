@@ -109,7 +109,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let position = corner + pixel_in_tile(lane);
   let place = vec2f(pixel_in_tile(lane)) + 0.5;
   let own_block = lane / BLOCK_THREADS;
-  let least_power = log2(ALPHA_MIN);
+  let min_power = log2(ALPHA_MIN);
 
   var pixels = start_pixels(position);
   if (lane == 0u) { paints[NO_SPLAT].y = bitcast<u32>(NO_POWER); }
@@ -123,7 +123,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (count == 0u) { break; }
     workgroupBarrier();
 
-    paint_batch(&pixels, own_block, place, least_power);
+    paint_batch(&pixels, own_block, place, min_power);
     if (!are_finished(pixels)) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
 

@@ -35,7 +35,7 @@ fn of_fixed(words: vec2i) -> f32 {
 // Gauss-Newton curvatures of the squared error of a view, which neglect second derivatives of the image: by all
 // harmonics of a channel at once, by the logit, and upper bounds of those by any scale or rotation, and by any step
 // along an axis.
-const BEND_COLOUR = 0u;
+const BEND_COLOR = 0u;
 const BEND_LOGIT = 1u;
 const BEND_SHAPE = 2u;
 const BEND_POSITION = 3u;
@@ -50,7 +50,7 @@ struct RefineView {
 }
 
 // Minimum length of an axis along which a splat moves, relative to its longest axis.
-const LEAST_AXIS = 0.02;
+const MIN_AXIS = 0.02;
 
 struct Turned {
   // Columns of the rotation.
@@ -72,7 +72,7 @@ fn turned(q: vec4f, logarithms: vec3f) -> Turned {
 
 // Distance that a step of 1 moves a splat along each of its axes.
 fn strides(scales: vec3f) -> vec3f {
-  return max(scales, vec3f(LEAST_AXIS * max(scales.x, max(scales.y, scales.z))));
+  return max(scales, vec3f(MIN_AXIS * max(scales.x, max(scales.y, scales.z))));
 }
 
 // Angle of a step of 1 about each axis: smaller for elongated splats, so that their ends do not move farther than they

@@ -49,7 +49,7 @@ struct View {
   // Direction of parallel rays, in block-local coordinates.
   axis: vec3f,
   // Maximum total coverage of the image by the splats of a frame, in COVERED_UNITs.
-  most_covered: u32,
+  max_covered: u32,
 }
 
 // Transforms block-local coordinates to camera axes. The eye is subtracted first, which is exact near it: far from the

@@ -8,7 +8,7 @@ import { serve } from '../../packages/cli/src/lib/server.mjs';
 
 const CORS = { 'access-control-allow-origin': '*' };
 /** A development server may have to bundle first. */
-const MOST_MS = 120_000;
+const MAX_MS = 120_000;
 
 /**
  * @param {{ folder?: string, elsewhere?: string, address?: string, faults?: RegExp }} app a folder to serve, with another one at another origin, whose address takes the
@@ -59,7 +59,7 @@ async function visit(page, faults, address) {
         return error ? error.message : loaded;
       },
       undefined,
-      { timeout: MOST_MS },
+      { timeout: MAX_MS },
     )
     .then(
       (handle) => handle.jsonValue(),
@@ -77,9 +77,9 @@ async function visit(page, faults, address) {
 
 /** A development server takes a while to listen. */
 async function open(page, address) {
-  for (const end = Date.now() + MOST_MS; ;) {
+  for (const end = Date.now() + MAX_MS; ;) {
     try {
-      return await page.goto(address, { timeout: MOST_MS });
+      return await page.goto(address, { timeout: MAX_MS });
     } catch (error) {
       // The browser's own page for a server that does not answer yet may come in between.
       if (!/ERR_CONNECTION_REFUSED|chrome-error:/.test(error.message) || Date.now() > end) throw error;

@@ -24,7 +24,7 @@ const besides = (target: Vector3, distance: number, angle: number): Camera =>
 /** A turn is at least so long, in milliseconds; a second of them without a wish is rest; more than these are none. */
 const TURN_MS = 4;
 const CALM_TURNS = 1000 / TURN_MS;
-const MOST_TURNS = 20_000 / TURN_MS;
+const MAX_TURNS = 20_000 / TURN_MS;
 
 /** A scene, and whoever draws it when asked to. */
 interface Page {
@@ -79,11 +79,11 @@ test('within a budget of splats and a pool that is full, a view at rest comes to
     const { scene, live } = await open(folder, { slots });
     const camera = besides([14, 0, 7], 2, angle);
     const draw = (): void => drawing.render({ gaussians: scene, camera, target: picture, detail: 0.3, splatBudget });
-    const took = await live(MOST_TURNS, draw);
+    const took = await live(MAX_TURNS, draw);
     const { budgetError } = await drawing.statistics();
     const { pages } = scene.traffic;
     console.log(`${slots} slots: ${pages} pages in ${took} turns; within ${budgetError.toFixed(2)} pixels`);
-    assert.ok(took < 0.9 * MOST_TURNS && pages < 4 * slots, `${pages} pages in ${took} turns`);
+    assert.ok(took < 0.9 * MAX_TURNS && pages < 4 * slots, `${pages} pages in ${took} turns`);
     assert.ok(budgetError > 0.3 && scene.progress.resident === slots, 'both are tight');
     scene.destroy();
   }
@@ -91,7 +91,7 @@ test('within a budget of splats and a pool that is full, a view at rest comes to
 });
 
 /** Pages of a copy that are finer than its coarsest, nearly all of them. */
-const MOST_OF_A_COPY = 8;
+const MAX_COPY_SHARE = 8;
 
 for (const isOne of [false, true]) {
   const name = `two views of one scene, ${isOne ? 'by one renderer' : 'by a renderer each'}: both have what they need at rest, and come to rest; while one moves the other has, too`;
@@ -118,20 +118,20 @@ for (const isOne of [false, true]) {
       };
       if (isMoving) {
         // As many as pages take to be asked for, fetched and placed, more where other tests share the processor; and some in which they might leave again.
-        const isThere = (): boolean => copiesOf(scene).every((pages) => pages >= MOST_OF_A_COPY);
+        const isThere = (): boolean => copiesOf(scene).every((pages) => pages >= MAX_COPY_SHARE);
         for (let [frame, after] = [0, 0]; after < 40 && frame < 2400; after += isThere() ? 1 : 0, frame++) {
           draw();
           await (await anyDevice()).queue.onSubmittedWorkDone();
           await pause(4);
         }
       } else {
-        const took = await live(MOST_TURNS, draw);
-        assert.ok(took < 0.9 * MOST_TURNS, `${took} turns`);
+        const took = await live(MAX_TURNS, draw);
+        assert.ok(took < 0.9 * MAX_TURNS, `${took} turns`);
         assert.equal(scene.progress.error, 0);
       }
       const copies = copiesOf(scene);
       console.log(`${isMoving ? 'one moves' : 'at rest'}: ${copies.join(' and ')} pages`);
-      assert.ok(Math.min(...copies) >= MOST_OF_A_COPY, `pages of the copies: ${copies.join()}`);
+      assert.ok(Math.min(...copies) >= MAX_COPY_SHARE, `pages of the copies: ${copies.join()}`);
       scene.destroy();
     }
     [picture, ...new Set(drawing)].forEach((owner) => owner.destroy());

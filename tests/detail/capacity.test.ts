@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import {
   CapacityMonitor,
   CountBuffers,
-  LEAST_CAPACITY,
+  MIN_CAPACITY,
   CapacityHistory,
   type Capacity,
   type SampledFrame,
@@ -19,7 +19,7 @@ function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonito
   const monitor = new CapacityMonitor(
     new CountBuffers(device),
     room,
-    { least, most: MOST },
+    { min: least, max: MOST },
     new CapacityHistory(),
     (requested) => (current = requested),
   );
@@ -38,11 +38,11 @@ function sample(monitor: CapacityMonitor, used: Capacity): void {
 }
 
 test('buffers that are nearly empty shrink, and grow before they are full', () => {
-  const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => LEAST_CAPACITY);
+  const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => MIN_CAPACITY);
   sample(monitor, { visible: 1000, pairs: 5000 });
-  assert.deepEqual(room(), { visible: 1250, pairs: LEAST_CAPACITY.pairs });
+  assert.deepEqual(room(), { visible: 1250, pairs: MIN_CAPACITY.pairs });
   monitor.judge({ visible: 1200, pairs: 5000 }, false);
-  assert.deepEqual(room(), { visible: 1500, pairs: LEAST_CAPACITY.pairs });
+  assert.deepEqual(room(), { visible: 1500, pairs: MIN_CAPACITY.pairs });
   monitor.judge({ visible: 3.9e6, pairs: 60e6 }, true);
   assert.deepEqual(room(), MOST);
 });
@@ -62,7 +62,7 @@ test('room that must stay does, and comes back as soon as more of it may', () =>
 
 test('views that come and go soon keep the room that the largest of them needs', () => {
   const start = { visible: 4e6, pairs: 6e6 };
-  const { monitor, room } = watch(start, () => LEAST_CAPACITY);
+  const { monitor, room } = watch(start, () => MIN_CAPACITY);
   const rooms = new Set<Capacity>([start]);
   // An orbit of 30 looks: one in three times as many splats as another.
   for (let looks = 0; looks < 3000; looks++) {
@@ -75,7 +75,7 @@ test('views that come and go soon keep the room that the largest of them needs',
 });
 
 test('pictures of fewer pixels do not take the room that the whole one at rest needs', () => {
-  const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => LEAST_CAPACITY);
+  const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => MIN_CAPACITY);
   const whole = { visible: 3.5e6, pairs: 5e6 };
   const smaller = { visible: 3e6, pairs: 1e6 };
   monitor.isDue(true, picture(4_000_000, 4_000_000));
@@ -97,7 +97,7 @@ function needAt(view: number, { pixels, isWhole }: SampledFrame): Capacity {
 
 for (const pixels of [4_000_000, 1_960_000, 250_000]) {
   test(`a camera that comes nearer in pictures of ${pixels} pixels has room for the whole one at any time`, () => {
-    const { monitor, room } = watch({ visible: 2e6, pairs: 2.5e6 }, () => LEAST_CAPACITY);
+    const { monitor, room } = watch({ visible: 2e6, pairs: 2.5e6 }, () => MIN_CAPACITY);
     const see = (view: number, picture: SampledFrame): void => {
       monitor.isDue(true, picture);
       monitor.judge(needAt(view, picture), false);
@@ -116,7 +116,7 @@ for (const pixels of [4_000_000, 1_960_000, 250_000]) {
 }
 
 test('where no whole picture was seen yet, one of more pixels than those in motion has some room', () => {
-  const { monitor, room } = watch({ visible: 1e6, pairs: 1e6 }, () => LEAST_CAPACITY);
+  const { monitor, room } = watch({ visible: 1e6, pairs: 1e6 }, () => MIN_CAPACITY);
   monitor.isDue(true, { pixels: 250_000, wholePixels: 4_000_000, isWhole: false });
   monitor.judge({ visible: 5e5, pairs: 9e5 }, false);
   assert.ok(room().pairs >= 3.6e6, `${room().pairs}`);

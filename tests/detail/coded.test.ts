@@ -14,12 +14,12 @@ import { cloudOfChunks, decodePage } from '@gaussian-splat/renderer/tools';
 import { constants, pageLayout } from '@gaussian-splat/renderer/stages';
 import {
   buildDetailTree,
-  codingOf,
+  codingFor,
   cutPages,
   manifestOf,
   packPage,
   PageEncoder,
-  USUAL_STEPS,
+  DEFAULT_STEPS,
   type PageSteps,
   HarmonicRounder,
 } from '@gaussian-splat/economise/pages';
@@ -63,7 +63,7 @@ for (const degree of [0, 1, 2, 3] as const) {
   test(`degree ${degree}: rows are those of pages that are not coded, and splats are where they were`, async () => {
     const cloud = withHarmonics(pebbles(6_000), degree);
     const tree = buildDetailTree(cloud, { geometry: 'quantized' });
-    const coding = codingOf(FINE);
+    const coding = codingFor(FINE);
     const encoder = new PageEncoder(tree, coding, { deflate });
     const scene = manifestOf(tree, [], String, coding);
     const parts = [];
@@ -138,7 +138,7 @@ test('harmonics of a splat that is seen from one side are rounded to what that s
 
 test('coarser levels, which are far from the scene anyway, have coarser coordinates and harmonics', async () => {
   const tree = buildDetailTree(withHarmonics(pebbles(6_000), 1), { geometry: 'quantized' });
-  const coding = codingOf(USUAL_STEPS);
+  const coding = codingFor(DEFAULT_STEPS);
   const encoder = new PageEncoder(tree, coding, { deflate });
   const scene = manifestOf(tree, [], String, coding);
   const steps: number[][] = tree.levels.map(() => []);
@@ -157,8 +157,8 @@ test('coarser levels, which are far from the scene anyway, have coarser coordina
 test('coarser levels keep the harmonics that show', async () => {
   const tree = buildDetailTree(withHarmonics(pebbles(6_000), 2), { geometry: 'quantized' });
   const [usual, fine] = await Promise.all(
-    [USUAL_STEPS, FINE].map(async (steps) => {
-      const coding = codingOf(steps);
+    [DEFAULT_STEPS, FINE].map(async (steps) => {
+      const coding = codingFor(steps);
       const encoder = new PageEncoder(tree, coding, { deflate });
       const parts = [];
       for (const page of cutPages(tree)) {
@@ -203,7 +203,7 @@ async function closenessOf(cloud: GaussianCloud, steps: PageSteps): Promise<{ de
 
 test('a scene streamed from coded pages is as near to the whole one as its steps are fine', async () => {
   const cloud = withHarmonics(pebbles(6_000), 2);
-  const [usual, fine] = [await closenessOf(cloud, USUAL_STEPS), await closenessOf(cloud, FINE)];
+  const [usual, fine] = [await closenessOf(cloud, DEFAULT_STEPS), await closenessOf(cloud, FINE)];
   console.log(
     [usual, fine]
       .map(({ decibels, bytes }) => `${decibels.toFixed(1)} dB, ${bytes.toFixed(1)} bytes a splat`)
@@ -215,7 +215,7 @@ test('a scene streamed from coded pages is as near to the whole one as its steps
 
 test('what is no coded page is refused, and no more is decompressed than a page can have', async () => {
   const tree = buildDetailTree(withHarmonics(pebbles(1_500), 1), { geometry: 'quantized' });
-  const coding = codingOf(USUAL_STEPS);
+  const coding = codingFor(DEFAULT_STEPS);
   const [page] = cutPages(tree);
   const whole = new PageEncoder(tree, coding, { deflate }).encode(page);
   const file = { chunks: page.chunks, upper: page.upper, shDegree: 1, coding } as const;
@@ -242,7 +242,7 @@ test('what is no coded page is refused, and no more is decompressed than a page 
 test('a manifest says how its files are coded', () => {
   const tree = buildDetailTree(pebbles(600), { geometry: 'quantized' });
   const manifest = JSON.parse(
-    JSON.stringify(manifestOf(tree, cutPages(tree), String, codingOf(USUAL_STEPS))),
+    JSON.stringify(manifestOf(tree, cutPages(tree), String, codingFor(DEFAULT_STEPS))),
   ) as object;
   assert.equal(checkManifest(manifest, 'detail.json').version, 4);
   const { coding } = manifest as { coding: object };

@@ -5,7 +5,7 @@ import { eyeOf, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
 import {
   CameraMotion,
   folderSource,
-  MOST_UPLOAD_BYTES,
+  MAX_UPLOAD_BYTES,
   UPLOAD_SHARE,
   UploadBudget,
 } from '@gaussian-splat/renderer/stages';
@@ -144,9 +144,9 @@ test('a frame uploads what an eighth of its time is enough for at first, and a l
   close(frames[20].bytes, frames[20].share * interval * 1e6, 0.1);
   close(frames[11].share - frames[10].share, 1 / 512);
   assert.ok(frames[1].share < 0.13 && frames[20].share < 0.17);
-  assert.equal(frames.at(-1)!.share, UPLOAD_SHARE.most);
+  assert.equal(frames.at(-1)!.share, UPLOAD_SHARE.max);
   close(frames.at(-1)!.bytes, (interval / 4) * 1e6);
-  assert.equal(paced(60, () => interval, 0.01).at(-1)!.bytes, MOST_UPLOAD_BYTES);
+  assert.equal(paced(60, () => interval, 0.01).at(-1)!.bytes, MAX_UPLOAD_BYTES);
   // However slow the frames are: what makes them slow may be the uploads. And a millisecond, however quick they are.
   close(paced(60, () => 500, 4).at(-1)!.bytes, 1.25e6);
   close(paced(60, () => 1, 4).at(-1)!.bytes, 0.25e6);
@@ -155,7 +155,7 @@ test('a frame uploads what an eighth of its time is enough for at first, and a l
 test('a frame that comes late halves the share, one after a rest does not, and one that uploads little does not raise it', () => {
   const interval = 1000 / 60;
   const late = paced(61, (frame) => (frame === 60 ? 2 : 1) * interval, 1);
-  close(late[60].share, Math.max(UPLOAD_SHARE.least, late[59].share / 2));
+  close(late[60].share, Math.max(UPLOAD_SHARE.min, late[59].share / 2));
   const rested = paced(61, (frame) => (frame === 60 ? 1000 : interval), 1);
   assert.equal(rested[60].share, rested[59].share);
   const lazy = new UploadBudget();
@@ -163,7 +163,7 @@ test('a frame that comes late halves the share, one after a rest does not, and o
     lazy.startFrame(interval * frame);
     lazy.note(65_536, 0.1);
   }
-  assert.equal(lazy.share, UPLOAD_SHARE.least);
+  assert.equal(lazy.share, UPLOAD_SHARE.min);
 });
 
 test('where uploads above 4 MB make a display leave a frame out, few are, and most of what would do is uploaded', () => {

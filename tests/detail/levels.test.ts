@@ -120,7 +120,7 @@ test('a scene that has room for all is, without an error, the picture of the sce
     log.every((path) => /^(3_0|env)\//.test(path)),
     'the coarsest first',
   );
-  const cloud = await readScene(folder.index, { name: 'lod-meta.json', openPart, level: 'all' });
+  const cloud = await readScene(folder.index, { name: 'lod-meta.json', openFile: openPart, level: 'all' });
   const whole = await GaussianBuffers.upload(device, packLevelRuns(cloud));
   const [streaming, loaded] = [new Renderer(device, options), new Renderer(device, options)];
   for (const camera of [viewFrom(14), viewFrom(5, 2)]) {
@@ -224,7 +224,7 @@ test(
     assert.equal(large.scene.progress.resident, large.scene.progress.total);
     const cloud = await readScene(index, {
       ...{ name: 'lod-meta.json', level: 'all' },
-      openPart: async (path) => sharedFile(folder + path),
+      openFile: async (path) => sharedFile(folder + path),
     });
     const whole = await GaussianBuffers.upload(device, packLevelRuns(cloud));
     const expected = await readFrame(device, renderer, { gaussians: whole, camera });

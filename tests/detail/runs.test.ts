@@ -91,7 +91,7 @@ test(
     const index = new TextDecoder().decode(sharedFile(`${folder}lod-meta.json`));
     const bytes = new TextEncoder().encode(index.replace(/"[012]":\{"file":\d+,"offset":\d+,"count":\d+\},?/g, ''));
     const read = (level: number | 'all'): Promise<GaussianCloud> =>
-      readScene(bytes, { name: 'lod-meta.json', openPart, level });
+      readScene(bytes, { name: 'lod-meta.json', openFile: openPart, level });
     const device = await anyDevice();
     const upload = async (level: number | 'all'): Promise<GaussianBuffers> =>
       GaussianBuffers.upload(

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { setImmediate as turn } from 'node:timers/promises';
 import {
-  MOST_UNDER_WAY,
+  MAX_IN_FLIGHT,
   NONE,
   SLOT_CHUNKS,
   PageStreamer,
@@ -191,7 +191,7 @@ test('what is under way is bounded in slots, not in pages', async () => {
     traffic.follow();
     for (const page of sent.splice(0)) waiting.add(page);
     const slots = [...waiting].reduce((sum, page) => sum + list.slots[page], 0);
-    assert.ok(slots < MOST_UNDER_WAY + largest, `${slots} slots under way`);
+    assert.ok(slots < MAX_IN_FLIGHT + largest, `${slots} slots under way`);
     for (const arrive of open.splice(0)) arrive();
     await turn();
     const next = traffic.next();

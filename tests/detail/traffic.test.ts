@@ -6,8 +6,8 @@ import {
   BRIDGED,
   DETAIL_NUMBERS,
   DetailTable,
-  MOST_FETCHES,
-  MOST_UNDER_WAY,
+  MAX_FETCHES,
+  MAX_IN_FLIGHT,
   NONE,
   SLOT_CHUNKS,
   PageStreamer,
@@ -102,7 +102,7 @@ test('a thousand pages that arrive as fast as they are sent for: few are under w
     assert.ok(frame < 1000, `${all.residency.residents} of 1200 pages after 1000 frames`);
     if (frame % 6 === 0) all.look((page) => shares[page]);
     for (let answers = 0; answers < 3; answers++) await all.server.answer();
-    assert.ok(all.traffic.underWay <= MOST_UNDER_WAY && all.server.most <= MOST_FETCHES);
+    assert.ok(all.traffic.underWay <= MAX_IN_FLIGHT && all.server.most <= MAX_FETCHES);
     const needs = place(all, 5).map((page) => all.residency.need(page));
     assert.deepEqual(
       needs,
@@ -120,7 +120,7 @@ test('what is sent for is what is needed most of all that can come', () => {
   const random = randomSource(4);
   const requests = all.look(() => random());
   const expected = [...Array(17).keys()].slice(1).sort((a, b) => requests[b] - requests[a]);
-  assert.deepEqual(all.server.log, expected.slice(0, MOST_FETCHES));
+  assert.deepEqual(all.server.log, expected.slice(0, MAX_FETCHES));
 });
 
 test('pages that two looks do not wish for are given up where they are, and may be asked for again', async () => {
@@ -128,22 +128,18 @@ test('pages that two looks do not wish for are given up where they are, and may 
   all.look(() => 0.5);
   await all.server.answer();
   const [waiting, fetching] = [all.traffic.waiting, all.server.open.length];
-  assert.equal(waiting, MOST_FETCHES);
-  assert.equal(fetching, MOST_FETCHES);
+  assert.equal(waiting, MAX_FETCHES);
+  assert.equal(fetching, MAX_FETCHES);
   const stale = all.server.open.splice(0);
   all.look(() => 0);
   assert.equal(all.traffic.next(), undefined, 'nothing is placed that the last look does not wish for');
-  assert.equal(
-    all.traffic.underWay,
-    2 * MOST_FETCHES,
-    'one look alone gives nothing up: another view may look in turn',
-  );
+  assert.equal(all.traffic.underWay, 2 * MAX_FETCHES, 'one look alone gives nothing up: another view may look in turn');
   all.look(() => 0);
   assert.equal(all.traffic.underWay, 0);
-  assert.equal(all.traffic.abandoned, 2 * MOST_FETCHES);
+  assert.equal(all.traffic.abandoned, 2 * MAX_FETCHES);
   assert.ok(stale.every(({ signal }) => signal.aborted));
   all.look(() => 0.5);
-  assert.equal(all.server.open.length, MOST_FETCHES);
+  assert.equal(all.server.open.length, MAX_FETCHES);
   // What was given up comes late, or fails as aborted fetches do: neither counts.
   stale.forEach(({ arrive, fail }, k) => (k % 2 ? arrive() : fail()));
   await turn();
@@ -163,18 +159,18 @@ test('pages that fail are told of once, make room for others, and nothing comes 
   const failed = all.server.open.splice(0);
   for (const { fail } of failed) fail();
   await turn();
-  assert.equal(all.errors.length, MOST_FETCHES);
-  assert.equal(all.server.open.length, MOST_FETCHES, 'the next ones are sent for');
+  assert.equal(all.errors.length, MAX_FETCHES);
+  assert.equal(all.server.open.length, MAX_FETCHES, 'the next ones are sent for');
   assert.equal(all.arrivals(), 0, 'there is nothing to draw');
   all.look(() => 0.5);
-  const again = all.server.log.slice(MOST_FETCHES).filter((page) => failed.some((fetch) => fetch.page === page));
+  const again = all.server.log.slice(MAX_FETCHES).filter((page) => failed.some((fetch) => fetch.page === page));
   assert.deepEqual(again, [], 'not for four seconds');
   all.traffic.close();
   const open = all.server.open.splice(0);
   assert.ok(open.every(({ signal }) => signal.aborted));
   open.forEach(({ fail }) => fail());
   await turn();
-  assert.equal(all.errors.length, MOST_FETCHES);
+  assert.equal(all.errors.length, MAX_FETCHES);
   assert.equal(all.server.open.length, 0);
 });
 
@@ -253,7 +249,7 @@ test('in a small pool, whatever comes in whatever order, what is above a page is
       for (const page of residents.filter((page) => page !== 0)) {
         assert.ok(all.residency.isResident(all.list.parent[page]), `page ${page} hangs in the air`);
       }
-      assert.ok(all.traffic.underWay <= MOST_UNDER_WAY);
+      assert.ok(all.traffic.underWay <= MAX_IN_FLIGHT);
       assert.ok(frame < 599, `view ${view} never comes to rest`);
     }
   }

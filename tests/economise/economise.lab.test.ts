@@ -13,9 +13,9 @@ import {
 } from '@gaussian-splat/core';
 import {
   dealOwnViews,
-  dealtViewsAround,
+  viewSplitAround,
   dealtViewsOfVisitors,
-  dealViews,
+  splitViews,
   decibels,
   economise,
   encodingsFor,
@@ -47,7 +47,7 @@ function ball(): GaussianCloud {
 }
 
 const scene = ball();
-const views = dealtViewsAround(boundsOf(scene), SIZE);
+const views = viewSplitAround(boundsOf(scene), SIZE);
 const fewer = {
   scored: viewsAround(boundsOf(scene), 24, SIZE),
   searched: views.searched.slice(0, 3),
@@ -93,7 +93,7 @@ test('fewer bands, set anew, come nearer to the colours than those that stay wou
   // Dim enough that no colour is black.
   for (let k = 0; k < sh.length; k++) sh[k] *= k % numbers < 3 ? 0.3 : 0.2;
   const cloud = { ...scene, count, sh };
-  const { scored: all, heldOut } = dealtViewsAround(boundsOf(scene), { width: 60, height: 40 });
+  const { scored: all, heldOut } = viewSplitAround(boundsOf(scene), { width: 60, height: 40 });
   const { lowered } = await scoreSplats(cloud, all, cpuScorer(cloud));
   const cut = new Float32Array(12 * count);
   for (let i = 0; i < count; i++) cut.set(sh.subarray(numbers * i, numbers * i + 12), 12 * i);
@@ -125,7 +125,7 @@ test('splats that nobody sees contribute nothing, and go without a trace', async
 });
 
 test('degrees go where colour does not depend on the view, at any price', async () => {
-  const { degrees, cloud } = reduce(scene, await scored, { minContribution: 0.2, colourPrice: 1e-14 });
+  const { degrees, cloud } = reduce(scene, await scored, { minContribution: 0.2, colorPrice: 1e-14 });
   assert.ok(degrees.filter((degree) => degree === 0).length >= 0.4 * cloud.count, 'half of them have no such colour');
   assert.ok(degrees.filter((degree) => degree === 2).length >= 0.3 * cloud.count, 'the others keep it');
 });
@@ -136,7 +136,7 @@ test('splats that no view looked at keep their colours, as they keep their place
   const cloud = { ...scene, positions };
   const { degrees, kept } = reduce(cloud, await scoreSplats(cloud, fewer.scored, cpuScorer(cloud)), {
     removalPrice: 1e-4,
-    colourPrice: 1e-4,
+    colorPrice: 1e-4,
   });
   const unseen = degrees.filter((_, k) => kept[k] < 10);
   assert.deepEqual([...unseen], new Array(10).fill(2));
@@ -166,7 +166,7 @@ function wall(): GaussianCloud {
 for (const name of ['a.glb', 'a.ply', 'a.spz']) {
   test(`${name}: splats of planes stay in the order that they are painted in, as if that were one of their degrees`, async () => {
     const cloud = wall();
-    const own = { ...dealtViewsAround(boundsOf(cloud), { ...SIZE, scored: 24 }) };
+    const own = { ...viewSplitAround(boundsOf(cloud), { ...SIZE, scored: 24 }) };
     const few = { ...own, searched: own.searched.slice(0, 3), heldOut: own.heldOut.slice(0, 3) };
     const evaluator = new PaintedEvaluator(cloud, { views: few });
     const { bytes, splats, degrees } = await economise(cloud, { minDecibels: 36, name, evaluator });
@@ -193,7 +193,7 @@ test('a PLY has finite numbers, of splats without any extent or opacity too', as
 
 for (const name of ['a.glb', 'a.ply', 'a.spz']) {
   test(`${name}: what is written is read again`, async () => {
-    const reduced = reduce(scene, await scored, { minContribution: 0.05, colourPrice: 1e-12 });
+    const reduced = reduce(scene, await scored, { minContribution: 0.05, colorPrice: 1e-12 });
     const encoding = encodingsFor(name).at(-1)!;
     const read = await readScene(await encoding.write(reduced), { name });
     assert.equal(read.count, reduced.cloud.count);
@@ -222,7 +222,7 @@ const away = (camera: Camera): Camera => ({
 test('what nothing shows of goes at any figure, however much of the rest would cost too much', async () => {
   const cloud = smallCloud(400, 0);
   for (let i = 0; i < 400; i++) if (i % 5 < 2) cloud.opacities[i] = 0;
-  const own = dealtViewsAround(boundsOf(cloud), { ...SIZE, scored: 24 });
+  const own = viewSplitAround(boundsOf(cloud), { ...SIZE, scored: 24 });
   const evaluator = new PaintedEvaluator(cloud, { views: own });
   const { splats } = await economise(cloud, { minDecibels: 75, name: 'a.ply', evaluator });
   assert.ok(splats.after <= 240, `${splats.after} splats, of which 240 paint something`);
@@ -231,7 +231,7 @@ test('what nothing shows of goes at any figure, however much of the rest would c
 test('where few splats make the error grow in steps, what fits is found below the step', async () => {
   for (const seed of [25, 37, 43]) {
     const cloud = smallCloud(120, 0, seed);
-    const dealt = dealtViewsAround(boundsOf(cloud), { width: 60, height: 40, scored: 24 });
+    const dealt = viewSplitAround(boundsOf(cloud), { width: 60, height: 40, scored: 24 });
     const own = { ...dealt, searched: dealt.searched.slice(0, 2), heldOut: dealt.heldOut.slice(0, 1) };
     const evaluator = new PaintedEvaluator(cloud, { views: own });
     const { splats, decibels: found } = await economise(cloud, { minDecibels: 40, name: 'a.ply', evaluator });
@@ -243,7 +243,7 @@ test('where all splats of a file take as many coefficients none loses some for n
   const cloud = smallCloud(400, 2);
   // Every other splat has bands that show, so that all have a place for them.
   for (let k = 0; k < cloud.sh.length; k++) if (k % 27 >= 3) cloud.sh[k] *= k % 54 < 27 ? 0.02 : 0.4;
-  const dealt = dealtViewsAround(boundsOf(cloud), { ...SIZE, scored: 24 });
+  const dealt = viewSplitAround(boundsOf(cloud), { ...SIZE, scored: 24 });
   const own = { ...dealt, searched: dealt.searched.slice(0, 3), heldOut: dealt.heldOut.slice(0, 3) };
   const smaller = (name: string) =>
     economise(cloud, { minDecibels: 40, name, evaluator: new PaintedEvaluator(cloud, { views: own }) });
@@ -297,7 +297,7 @@ test('a format that cannot reach the figure is refused with what it can', async 
 
 test('views are dealt out without sharing one', () => {
   const all = viewsAround(boundsOf(scene), 40);
-  const { scored: a, searched: b, heldOut: c } = dealViews(all);
+  const { scored: a, searched: b, heldOut: c } = splitViews(all);
   assert.deepEqual([a.length, b.length, c.length], [28, 4, 8]);
   assert.equal(new Set([...a, ...b, ...c]).size, 40);
 });

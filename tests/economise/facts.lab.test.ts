@@ -27,7 +27,7 @@ const WRITERS: Readonly<Record<string, (cloud: GaussianCloud) => Promise<Gaussia
   'lod-meta': async (cloud) => {
     const files = await writeStreamedSog(cloud, fine);
     const openPart = async (path: string): Promise<Uint8Array> => files.get(path)!;
-    return readScene(files.get('lod-meta.json')!, { name: 'lod-meta.json', openPart });
+    return readScene(files.get('lod-meta.json')!, { name: 'lod-meta.json', openFile: openPart });
   },
 };
 

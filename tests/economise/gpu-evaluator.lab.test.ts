@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { boundsOf, eyeOf, type GaussianCloud } from '@gaussian-splat/core';
 import {
-  dealtViewsAround,
+  viewSplitAround,
   decibels,
   degreesOf,
   economise,
@@ -40,7 +40,7 @@ function ball(): GaussianCloud {
 }
 
 const scene = ball();
-const dealt = dealtViewsAround(boundsOf(scene), SIZE);
+const dealt = viewSplitAround(boundsOf(scene), SIZE);
 const views = {
   scored: dealt.scored.slice(0, 16),
   searched: dealt.searched.slice(0, 1),
@@ -188,8 +188,8 @@ const median = (values: Float32Array, share: number): number =>
 for (const [name, cutOf] of [
   ['by contribution', () => ({ minContribution: median(ranking.contribution, 0.2) })],
   ['by what the pictures would lack', () => ({ removalPrice: median(ranking.removalError, 0.15) })],
-  ['of bands of colour', () => ({ colourPrice: Math.fround(1e-9) })],
-  ['of both', () => ({ minContribution: median(ranking.contribution, 0.1), colourPrice: Math.fround(1e-10) })],
+  ['of bands of colour', () => ({ colorPrice: Math.fround(1e-9) })],
+  ['of both', () => ({ minContribution: median(ranking.contribution, 0.1), colorPrice: Math.fround(1e-10) })],
 ] as const satisfies readonly (readonly [string, () => Cut])[]) {
   test(`a cut on the GPU shows what the reduced cloud shows: ${name}`, async () => {
     const cut = cutOf();
@@ -215,7 +215,7 @@ test('splats that no view looked at keep their colours, as they keep their place
   };
   const other = await GpuEvaluator.create(device, cloud, views);
   await other.rank();
-  const cut = { removalPrice: 1e-4, colourPrice: 1e-4 };
+  const cut = { removalPrice: 1e-4, colorPrice: 1e-4 };
   const { degrees, kept, cloud: left } = await other.reduce(cut);
   const expected = reduce(cloud, await other.scores(), cut);
   other.destroy();
@@ -252,7 +252,7 @@ test('the asked figure is met by the written file', async () => {
 });
 
 test('pairs are merged by its scores, and what that costs is measured on its pictures', async () => {
-  const merging = new MergingEvaluator(evaluator, scene, { views: views.scored, mostError: 1e-3 });
+  const merging = new MergingEvaluator(evaluator, scene, { views: views.scored, maxError: 1e-3 });
   assert.deepEqual(await merging.rank(), ranking);
   const [mergePrice] = merging.mergePrices.slice(-1);
   const cut: Cut = { mergePrice, minContribution: median(ranking.contribution, 0.1) };
@@ -265,7 +265,7 @@ test('pairs are merged by its scores, and what that costs is measured on its pic
   // As the CPU's scores would have it, within what float16 and peaks leave open.
   const cpu = new MergingEvaluator(new PaintedEvaluator(scene, { views }), scene, {
     views: views.scored,
-    mostError: 1e-3,
+    maxError: 1e-3,
   });
   await cpu.rank();
   const theirs = await cpu.reduce({ mergePrice });

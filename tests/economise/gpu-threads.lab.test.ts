@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
-import { dealtViewsAround, degreesOf, GpuEvaluator, type ReducedCloud } from '@gaussian-splat/economise';
+import { viewSplitAround, degreesOf, GpuEvaluator, type ReducedCloud } from '@gaussian-splat/economise';
 import { inline, type TaskPool } from '@gaussian-splat/economise/parts';
 import { ThreadPool } from '../../packages/cli/src/lib/thread-pool.mjs';
 import { assertSameCloud, assertSameNumbers } from '../formats/support/expect.js';
@@ -38,7 +38,7 @@ function scene(): GaussianCloud {
 
 test('threads take out of a scene what one thread does', async () => {
   const cloud = scene();
-  const dealt = dealtViewsAround(boundsOf(cloud), { width: 48, height: 32 });
+  const dealt = viewSplitAround(boundsOf(cloud), { width: 48, height: 32 });
   const views = {
     scored: dealt.scored.slice(0, 3),
     searched: dealt.searched.slice(0, 1),
@@ -49,7 +49,7 @@ test('threads take out of a scene what one thread does', async () => {
     const evaluator = await GpuEvaluator.create(device, cloud, views, { pool: workers });
     try {
       await evaluator.rank();
-      return await evaluator.reduce({ minContribution: 0.02, colourPrice: 1e-6 });
+      return await evaluator.reduce({ minContribution: 0.02, colorPrice: 1e-6 });
     } finally {
       evaluator.destroy();
     }

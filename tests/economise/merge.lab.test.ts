@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { before, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import {
-  dealtViewsAround,
+  viewSplitAround,
   decibels,
   economise,
   meanSquare,
@@ -44,12 +44,12 @@ function twins(): GaussianCloud {
 }
 
 const scene = twins();
-const dealt = dealtViewsAround(boundsOf(scene), { ...SIZE, scored: 24 });
+const dealt = viewSplitAround(boundsOf(scene), { ...SIZE, scored: 24 });
 const views = { ...dealt, searched: dealt.searched.slice(0, 4), heldOut: dealt.heldOut.slice(0, 4) };
 const mergingTo = (decibels: number): MergingEvaluator =>
   new MergingEvaluator(new PaintedEvaluator(scene, { views }), scene, {
     views: views.scored,
-    mostError: 10 ** (-decibels / 10),
+    maxError: 10 ** (-decibels / 10),
   });
 
 let merging: MergingEvaluator;
@@ -160,8 +160,8 @@ test('a merge whose other half is dropped is not made, and saves nothing twice',
 
 test('colours keep the bands of the one that keeps more, and the most seen come first', async () => {
   const { cut } = await atMerges(200);
-  const plain = await merging.reduce({ colourPrice: 1e-9 });
-  const merged = await merging.reduce({ ...cut, colourPrice: 1e-9 });
+  const plain = await merging.reduce({ colorPrice: 1e-9 });
+  const merged = await merging.reduce({ ...cut, colorPrice: 1e-9 });
   const degreeOf = new Map([...plain.kept].map((i, k) => [i, plain.degrees[k]]));
   merged.kept.forEach((i, k) => {
     if (i >= SPLATS - 100) return;
@@ -177,7 +177,7 @@ test('colours keep the bands of the one that keeps more, and the most seen come 
 });
 
 test('the source is left as it is', async () => {
-  await merging.reduce({ mergePrice: 1, colourPrice: 1e-10 });
+  await merging.reduce({ mergePrice: 1, colorPrice: 1e-10 });
   assert.deepEqual(scene, twins());
 });
 

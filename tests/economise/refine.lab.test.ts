@@ -2,11 +2,11 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { boundsOf, eyeOf, GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { dealtViewsAround, decibels, economise, meanSquare, RefiningEvaluator } from '@gaussian-splat/economise';
+import { viewSplitAround, decibels, economise, meanSquare, RefiningEvaluator } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { readBack } from '@gaussian-splat/renderer/tools';
 import { CloudBuffers } from '../../packages/economise/src/gpu/cloud-buffers.js';
-import { PictureErrors } from '../../packages/economise/src/gpu/picture-errors.js';
+import { ImageErrors } from '../../packages/economise/src/gpu/image-errors.js';
 import { RefinedScene } from '../../packages/economise/src/refine/refined-scene.js';
 import { SceneFitter, USUAL_DESCENT } from '../../packages/economise/src/refine/scene-fitter.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
@@ -79,9 +79,9 @@ before(async () => {
   renderer = new Renderer(device, { quality: 'reference' });
 });
 
-async function picturesOf(cloud: GaussianCloud, views: readonly Camera[]): Promise<PictureErrors> {
+async function imagesOf(cloud: GaussianCloud, views: readonly Camera[]): Promise<ImageErrors> {
   const gaussians = await CloudBuffers.upload(device, cloud);
-  const pictures = await PictureErrors.of(device, renderer, gaussians, views);
+  const pictures = await ImageErrors.of(device, renderer, gaussians, views);
   gaussians.destroy();
   return pictures;
 }
@@ -141,7 +141,7 @@ const KINDS = {
   colour: { span: [10, 13], bend: 0, kept: [3.9, 4.1] },
   bands: { span: [13, 22], bend: 0, kept: [1, Infinity] },
 };
-const LEAST_CURVATURE = 1e-4;
+const MIN_CURVATURE = 1e-4;
 /** Of `Descent.newton`: no step is shortened. */
 const UNLIMITED = 1e38;
 const STEP = 1e-2;
@@ -151,8 +151,8 @@ for (const antialiased of [false, true]) {
     const count = 40;
     const whole = { ...ball(count), antialiased };
     const cloud = disturbed(whole);
-    const views = dealtViewsAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 }).scored.slice(0, 2);
-    const pictures = await picturesOf(whole, views);
+    const views = viewSplitAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 }).scored.slice(0, 2);
+    const pictures = await imagesOf(whole, views);
     // A splat that keeps fewer bands.
     const degrees = new Uint8Array(count).fill(DEGREE);
     degrees[3] = 0;
@@ -183,7 +183,7 @@ for (const antialiased of [false, true]) {
           if (number >= 13 && degrees[i] === 0) continue;
           const curvature = Math.max(...views.map((_, k) => curvatureOf(less[k], more[k])));
           const kept = curvatures[4 * i + bend] / curvature;
-          if (curvature > LEAST_CURVATURE) assert.ok(kept > least && kept < most, `${kind} of splat ${i}: ${kept}`);
+          if (curvature > MIN_CURVATURE) assert.ok(kept > least && kept < most, `${kind} of splat ${i}: ${kept}`);
         }
       }
       // Splats that begin to paint a pixel, or cease to, do so at once: differences have that, derivatives do not.
@@ -200,7 +200,7 @@ for (const antialiased of [false, true]) {
 test('a few steps come nearer in views that were not fitted, and leave the source as it is', async () => {
   const count = 120;
   const whole = ball(count);
-  const dealt = dealtViewsAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
+  const dealt = viewSplitAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
   const kept = Uint32Array.from({ length: 114 }, (_, k) => k + 6);
   const cloud = without(whole, 6);
   const before = structuredClone(cloud);
@@ -239,12 +239,12 @@ function veiled(ball: GaussianCloud, eye: readonly number[]): GaussianCloud {
 
 test('a splat that the near plane cuts off in a view is not moved into it', async () => {
   const bare = ball(120);
-  const dealt = dealtViewsAround(boundsOf(bare), { width: SIZE, height: SIZE, scored: 24 });
+  const dealt = viewSplitAround(boundsOf(bare), { width: SIZE, height: SIZE, scored: 24 });
   const [seen] = dealt.heldOut;
   const whole = veiled(bare, eyeOf(seen.worldToCamera));
   const cloud = without(whole, 6);
-  const pictures = await picturesOf(whole, dealt.scored.slice(0, 12));
-  const others = await picturesOf(whole, dealt.heldOut);
+  const pictures = await imagesOf(whole, dealt.scored.slice(0, 12));
+  const others = await imagesOf(whole, dealt.heldOut);
   const fitted = async (newton: number): Promise<{ before: number; after: number; read: GaussianCloud }> => {
     const scene = await RefinedScene.of(device, { cloud, degrees: new Uint8Array(cloud.count).fill(DEGREE) });
     const fitter = new SceneFitter(device, renderer, scene, pictures);
@@ -270,7 +270,7 @@ test('a splat that the near plane cuts off in a view is not moved into it', asyn
 
 test('the figure is kept with fewer splats, and the source is left as it is', async () => {
   const whole = twins(200);
-  const dealt = dealtViewsAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
+  const dealt = viewSplitAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
   const options = { minDecibels: 43, name: 'a.glb' };
   const painted = (): PaintedEvaluator => new PaintedEvaluator(whole, { views: dealt });
   const unrefined = await economise(whole, { ...options, evaluator: painted() });
@@ -291,7 +291,7 @@ test('the figure is kept with fewer splats, and the source is left as it is', as
 
 test('without a device it says so', () => {
   const cloud = ball(4);
-  const views = dealtViewsAround(boundsOf(cloud));
+  const views = viewSplitAround(boundsOf(cloud));
   const options = { device: undefined as unknown as GPUDevice, views: views.scored };
   assert.throws(
     () => new RefiningEvaluator(new PaintedEvaluator(cloud, { views }), cloud, options),

@@ -11,8 +11,8 @@ import { encodingsFor } from '@gaussian-splat/economise';
 import {
   framePath,
   LoadBudget,
-  movedCloud,
-  movedFrame,
+  applyMotion,
+  motionFrame,
   parseSequence,
   readMotion,
   readScene,
@@ -86,10 +86,10 @@ test('frames are as near to the scene files as it says', { timeout: 400_000 }, a
   const first = await readScene(read(framePath(sequence, 0)), { name: 'first.sog' });
   const order = packedOrder(cloud);
   for (let frame = 1; frame < FRAMES; frame++) {
-    const { path, frame: own, frames } = movedFrame(sequence, frame)!;
+    const { path, frame: own, frames } = motionFrame(sequence, frame)!;
     const budget = new LoadBudget(1 << 24);
     const motion = await readMotion({ bytes: read(path), name: path, splats: first.count, frames, budget });
-    const moved = movedCloud(first, motion, own, path, budget);
+    const moved = applyMotion(first, motion, own, path, budget);
     const asked = frameOf(cloud, frame);
     const far = order.reduce(
       (most, i, k) => Math.max(most, Math.abs(moved.positions[3 * k + 1] - asked.positions[3 * i + 1])),

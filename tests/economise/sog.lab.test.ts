@@ -179,7 +179,7 @@ test('a streamed scene: the finest levels of all boxes are the scene, each coars
   }
   const openPart = async (path: string): Promise<Uint8Array> => files.get(path)!;
   const levelAt = (level: number): Promise<GaussianCloud> =>
-    readScene(index, { name: 'lod-meta.json', openPart, level });
+    readScene(index, { name: 'lod-meta.json', openFile: openPart, level });
   const finest = await levelAt(0);
   const plain = await read(await writeSog(cloud, { steps: FINEST, palette: 64, encodeWebp, effort: 0 }));
   assert.equal(finest.count, plain.count);

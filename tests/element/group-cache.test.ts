@@ -9,7 +9,7 @@ const FRAMES = 30;
 const SPLATS = 150_000;
 const PLANES = 40;
 /** Groups of 20 MB that memory has room for, and one that is being fetched. */
-const MOST_HELD = 9;
+const MAX_HELD = 9;
 /** A part in memory, without the memory. */
 const partOf = (splats: number): PackedAnimation =>
   ({
@@ -84,8 +84,8 @@ test('an hour of play holds no more than a minute', async () => {
     await settle();
     assert.ok(cache.get(group, 0) && cache.get(group, 1), `group ${group} is there`);
     const behind = Array.from({ length: group }, (_, k) => k).filter((k) => cache.get(k, 0) ?? cache.get(k, 1));
-    assert.ok(cache.held <= MOST_HELD, `${cache.held} groups at ${group}`);
-    assert.ok((behind[0] ?? group) > group - MOST_HELD, `${behind.join()} at ${group}`);
+    assert.ok(cache.held <= MAX_HELD, `${cache.held} groups at ${group}`);
+    assert.ok((behind[0] ?? group) > group - MAX_HELD, `${behind.join()} at ${group}`);
     if (group < 60) minute = Math.max(minute, cache.held);
     else hour = Math.max(hour, cache.held);
   }

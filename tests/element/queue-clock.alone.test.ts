@@ -113,10 +113,10 @@ test('a frame takes what its work takes: alone, behind others, and behind the wo
   await page.until(page.now + 100);
   const expected = [0.6, 40, 40, 40, 40, 5];
   assert.equal(times.length, expected.length);
-  times.forEach(({ atLeast, atMost }, k) => {
+  times.forEach(({ lowerBound, upperBound }, k) => {
     assert.ok(
-      Math.abs(atLeast - expected[k]) < 0.1 && Math.abs(atMost - expected[k]) < 0.1,
-      `${k}: ${atLeast} ${atMost}`,
+      Math.abs(lowerBound - expected[k]) < 0.1 && Math.abs(upperBound - expected[k]) < 0.1,
+      `${k}: ${lowerBound} ${upperBound}`,
     );
   });
 });
@@ -132,10 +132,10 @@ test('the clock of WebGL: frames that are drawn before the last is done take wha
   }
   await page.until(page.now + 300);
   assert.equal(times.length, expected.length);
-  times.forEach(({ atLeast, atMost }, k) => {
+  times.forEach(({ lowerBound, upperBound }, k) => {
     // What waiting for nothing takes is not taken off, and pages ask once a millisecond.
     const [least, most] = [expected[k] - 2, expected[k] + THERE + BACK + 2];
-    assert.ok(atLeast >= least && atMost <= most, `${k}: ${atLeast} to ${atMost}, not ${expected[k]} ms`);
+    assert.ok(lowerBound >= least && upperBound <= most, `${k}: ${lowerBound} to ${upperBound}, not ${expected[k]} ms`);
   });
 });
 
@@ -152,11 +152,15 @@ test('a frame that is told of late, since the thread was busy, took something be
       await page.until(page.now + before);
       page.block(blocked);
       await page.until(page.now + 200);
-      const { atLeast, atMost } = found!;
-      assert.ok(atLeast <= work + 0.1 && atMost >= work - 0.1, `${work} ms: ${atLeast} to ${atMost}`);
+      const { lowerBound, upperBound } = found!;
+      assert.ok(lowerBound <= work + 0.1 && upperBound >= work - 0.1, `${work} ms: ${lowerBound} to ${upperBound}`);
       const done = work + THERE + BACK;
       const isLate = done > before && done < before + blocked;
-      assert.equal(atMost - atLeast > 2, isLate, `${work} ms, busy from ${before} on: ${atLeast} to ${atMost}`);
+      assert.equal(
+        upperBound - lowerBound > 2,
+        isLate,
+        `${work} ms, busy from ${before} on: ${lowerBound} to ${upperBound}`,
+      );
     }
   }
 });

@@ -8,7 +8,7 @@ import type { DynamicState } from '../../packages/element/src/dynamic/dynamic-mo
 import { StateReader } from '../../packages/element/src/dynamic/read-state.js';
 
 const CAMERA = {} as Camera;
-const STATE: DynamicState = { timeSeconds: 0, pose: undefined, controls: {}, pictures: {} };
+const STATE: DynamicState = { timeSeconds: 0, pose: undefined, controls: {}, images: {} };
 
 /** Reads states for models with these inputs. */
 function readerOf(...models: Contract['inputs'][]): {
@@ -54,7 +54,7 @@ test('a control that is a tensor of Gaussians in the next model can still be set
 
 test('a text for a control is told as it was written, capital letters of the input or not', () => {
   const { read, told } = readerOf({ Amount: control(0, 1) });
-  assert.deepEqual(read({ pictures: { amount: 'much' } }).controls, {});
+  assert.deepEqual(read({ images: { amount: 'much' } }).controls, {});
   assert.equal(told.length, 1);
   assert.match(told[0], /control Amount: expected numbers, found much/);
 });
@@ -79,6 +79,6 @@ test('a seed is set like a control: a whole number of 32 bits, or the nearest', 
   assert.equal(told.length, 2);
   assert.match(told[0], /control Noise: expected a whole number from -2147483648 to 2147483647, found 2\.6/);
   assert.match(told[1], /found 1000000000000/);
-  assert.equal(read({ pictures: { noise: 'much' } }).seed, undefined);
+  assert.equal(read({ images: { noise: 'much' } }).seed, undefined);
   assert.match(told[2], /control Noise: expected numbers, found much/);
 });

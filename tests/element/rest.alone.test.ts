@@ -36,7 +36,7 @@ const took = (
   plan: Pick<FramePlan, 'level' | 'size'>,
   milliseconds: number,
   now: number,
-): void => pace.sample(plan, { doneAt: now + milliseconds, atLeast: milliseconds, atMost: milliseconds });
+): void => pace.sample(plan, { doneAt: now + milliseconds, lowerBound: milliseconds, upperBound: milliseconds });
 
 for (const wholeMs of [20, 100, 200, 214]) {
   test(`a true image of ${wholeMs} ms is on show 300 ms after rest, and not begun before 50 ms`, (context) => {

@@ -4,7 +4,7 @@ import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { USUAL_STEPS } from '@gaussian-splat/economise/pages';
+import { DEFAULT_STEPS } from '@gaussian-splat/economise/pages';
 import { finestPages } from '@gaussian-splat/renderer/tools';
 import { glBytes } from '@gaussian-splat/renderer/webgl';
 import { deflate } from '../../packages/cli/src/lib/encoders.mjs';
@@ -24,7 +24,7 @@ const cloud: GaussianCloud = smallCloud(COUNT, 1);
 before(async () => {
   const put = (folder: string, all: ReadonlyMap<string, Uint8Array | ArrayBuffer>): void =>
     all.forEach((bytes, path) => files.set(`/${folder}/${path}`, new Uint8Array(bytes)));
-  const coded = { steps: USUAL_STEPS, deflate };
+  const coded = { steps: DEFAULT_STEPS, deflate };
   for (const [name, folder] of [
     ['coded', detailFolder(cloud, undefined, { geometry: 'quantized', coded })],
     ['plain', detailFolder(cloud, undefined, { geometry: 'quantized' })],

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, test } from 'node:test';
-import { USUAL_STEPS } from '@gaussian-splat/economise/pages';
+import { DEFAULT_STEPS } from '@gaussian-splat/economise/pages';
 import { deflateQuickly } from '../../packages/cli/src/lib/encoders.mjs';
 import { loadScene } from '../../packages/element/src/loading/load-scene.js';
 import type { SceneRequest } from '../../packages/element/src/loading/protocol.js';
@@ -17,7 +17,7 @@ let server: Server;
 let base: string;
 
 before(async () => {
-  const coded = { steps: USUAL_STEPS, deflate: deflateQuickly };
+  const coded = { steps: DEFAULT_STEPS, deflate: deflateQuickly };
   const folder = detailFolder(smallCloud(COUNT, 0), undefined, { geometry: 'quantized', coded });
   const manifest = Buffer.from(JSON.stringify(folder.manifest));
   server = createServer((request, response) => {

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { partRequest } from '@gaussian-splat/core/fetch';
+import { fileRequest } from '@gaussian-splat/core/fetch';
 
 const manifest = { url: 'https://x.test/a/scene.json?v=1', credentials: 'include' } as const;
 
@@ -17,7 +17,7 @@ test('files beside a manifest are asked for as it was', () => {
     ['https://x.test/b.spz', 'https://x.test/b.spz?v=1'],
     ['//x.test/b.spz?c', 'https://x.test/b.spz?c'],
   ];
-  for (const [path, url] of cases) assert.deepEqual(partRequest(path, manifest), { url, credentials: 'include' });
+  for (const [path, url] of cases) assert.deepEqual(fileRequest(path, manifest), { url, credentials: 'include' });
 });
 
 test('other servers are refused, unless the page allows them; they get no cookies', () => {
@@ -32,22 +32,22 @@ test('other servers are refused, unless the page allows them; they get no cookie
   const foreign = ['data:,b', 'javascript:alert(1)', 'file:///etc/passwd', 'blob:https://y.test/1-2', 'blob:x'];
   for (const path of [...others, ...foreign]) {
     assert.throws(
-      () => partRequest(path, manifest),
+      () => fileRequest(path, manifest),
       /x\.test.*or on servers that the page allows.*decode\/unsupported/,
       path,
     );
   }
-  const allowed = partRequest('//y.test/b', manifest, ['https://y.test']);
+  const allowed = fileRequest('//y.test/b', manifest, ['https://y.test']);
   assert.deepEqual(allowed, { url: 'https://y.test/b', credentials: 'omit' });
-  assert.throws(() => partRequest('https://y.test.z/b', manifest, ['https://y.test']), GaussianSplatError);
+  assert.throws(() => fileRequest('https://y.test.z/b', manifest, ['https://y.test']), GaussianSplatError);
 });
 
 test('a manifest that is a file of the page names whole addresses of its server', () => {
   const own = { url: 'blob:https://x.test/1-2', credentials: 'same-origin' } as const;
-  assert.equal(partRequest('https://x.test/b.spz', own).url, 'https://x.test/b.spz');
+  assert.equal(fileRequest('https://x.test/b.spz', own).url, 'https://x.test/b.spz');
   for (const path of ['b.spz', 'https://y.test/b.spz'])
-    assert.throws(() => partRequest(path, own), /serve the manifest/i);
+    assert.throws(() => fileRequest(path, own), /serve the manifest/i);
   const local = { url: 'file:///a/scene.json', credentials: 'omit' } as const;
-  assert.equal(partRequest('b.spz', local).url, 'file:///a/b.spz');
-  assert.throws(() => partRequest('https://x.test/b.spz', local), GaussianSplatError);
+  assert.equal(fileRequest('b.spz', local).url, 'file:///a/b.spz');
+  assert.throws(() => fileRequest('https://x.test/b.spz', local), GaussianSplatError);
 });

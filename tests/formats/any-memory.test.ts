@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import vm from 'node:vm';
-import { readPrefix, readScene, type OpenPart } from '@gaussian-splat/formats';
+import { readPrefix, readScene, type OpenFile } from '@gaussian-splat/formats';
 import { assertSameCloud } from './support/expect.js';
 import { fuzzScenes } from './support/fuzz.js';
 
@@ -40,8 +40,8 @@ for (const [format, scenes] of Object.entries(fuzzScenes())) {
   test(`${format}: Buffers at any address give the same cloud`, async () => {
     for (const { name, files } of scenes) {
       const read = (place: (bytes: Uint8Array) => Uint8Array): ReturnType<typeof readScene> => {
-        const openPart: OpenPart = async (path) => place(files[path]);
-        return readScene(place(files[name]), { name, openPart });
+        const openPart: OpenFile = async (path) => place(files[path]);
+        return readScene(place(files[name]), { name, openFile: openPart });
       };
       const expected = await read((bytes) => new Uint8Array(bytes));
       assert.ok(expected.count > 0);

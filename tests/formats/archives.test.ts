@@ -217,7 +217,8 @@ test('the real streamed scene: 7 levels', { skip: needsSharedData }, async () =>
   const counts = [];
   for (const level of [3, 4, 5, 6]) {
     counts.push(
-      (await readScene(sharedFile(`${folder}lod-meta.json`), { name: 'lod-meta.json', openPart, level })).count,
+      (await readScene(sharedFile(`${folder}lod-meta.json`), { name: 'lod-meta.json', openFile: openPart, level }))
+        .count,
     );
   }
   assert.deepEqual(counts, [31_000, 8_406, 3_000, 1_873]);

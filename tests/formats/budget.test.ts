@@ -21,7 +21,7 @@ const SCRIPT = fileURLToPath(new URL('./support/read-measured.ts', import.meta.u
 /** What grows with references shows at the largest factor whose file is small enough, and at one where the file is next to nothing; the laboratory has those between. */
 const FACTORS = [10, 1_000, 30_000, 1_000_000];
 /** Larger files are what they are for. */
-const MOST_FILE_BYTES = 8e6;
+const MAX_FILE_BYTES = 8e6;
 /** The program and what its libraries take while they work, beyond the account of SECURITY.md. */
 const OWN_BYTES = 100e6;
 
@@ -55,7 +55,7 @@ for (const [name, multiply] of someOf(Object.entries({ ...MULTIPLIED, ...MULTIPL
     for (const factor of FACTORS) {
       const made = multiply(factor);
       const bytes = made.file.length + (made.beside?.length ?? 0);
-      if (bytes > MOST_FILE_BYTES) break;
+      if (bytes > MAX_FILE_BYTES) break;
       sized.push({ factor, made, bytes });
     }
     const read = isLab ? sized : sized.filter((_, k) => k === 1 || k === sized.length - 1);

@@ -20,7 +20,7 @@ const BOUNDS: Record<string, number> = {
   max_scale_y: -2,
   max_scale_z: -3,
 };
-const COLOUR_BOUNDS: Record<string, number> = { min_r: -1, min_g: 0, min_b: 0.25, max_r: 1, max_g: 2, max_b: 0.75 };
+const COLOR_BOUNDS: Record<string, number> = { min_r: -1, min_g: 0, min_b: 0.25, max_r: 1, max_g: 2, max_b: 0.75 };
 
 interface PackedSplat {
   readonly position?: number;
@@ -120,7 +120,7 @@ test('colours: plain 0..1 with 12 chunk properties, between the bounds with 18; 
   const colours = (sh: Float32Array) => Array.from(sh, (v) => 0.5 + 0.28209479177387814 * v);
   near(colours(plain.sh), [1, 128 / 255, 0, 0, 0, 0]);
   assert.deepEqual([...plain.opacities], [1, 0]);
-  const bounded = await readScene(writePly(compressed(splats, { ...BOUNDS, ...COLOUR_BOUNDS })));
+  const bounded = await readScene(writePly(compressed(splats, { ...BOUNDS, ...COLOR_BOUNDS })));
   near(colours(bounded.sh), [1, (2 * 128) / 255, 0.25, -1, 0, 0.25]);
 });
 

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { strToU8, zipSync } from 'fflate';
-import { readCoarsest, readLodScene, readScene, SogFiles } from '@gaussian-splat/formats';
+import { readCoarsestLevel, readLodScene, readScene, SogFiles } from '@gaussian-splat/formats';
 import { lodFolder } from '../support/lod-folder.js';
 import { assertSameCloud, expectRefusal } from './support/expect.js';
 import { smallCloud } from './support/small-cloud.js';
@@ -31,14 +31,14 @@ const open = (path: string): Promise<Uint8Array> => Promise.resolve(FILES.get(pa
 test('a scene of bundles is that of folders, as a whole and at every level', async () => {
   for (const level of [0, 1, 'all'] as const) {
     assertSameCloud(
-      await readScene(bundled, { name: 'lod-meta.json', openPart: open, level }),
-      await readScene(folder.index, { name: 'lod-meta.json', openPart: plain, level }),
+      await readScene(bundled, { name: 'lod-meta.json', openFile: open, level }),
+      await readScene(folder.index, { name: 'lod-meta.json', openFile: plain, level }),
     );
   }
   const archive = zipSync({ 'lod-meta.json': bundled, ...Object.fromEntries(FILES) });
   assertSameCloud(
     await readScene(archive, { name: 'a.zip' }),
-    await readScene(folder.index, { name: 'lod-meta.json', openPart: plain }),
+    await readScene(folder.index, { name: 'lod-meta.json', openFile: plain }),
   );
 });
 
@@ -53,7 +53,7 @@ test('box by box, with one request for a bundle', async () => {
     const scene = readLodScene(index, 'lod-meta.json', INDEX);
     const [kept, fetch] = [new SogFiles(), fetchFrom(files)];
     return [
-      await readCoarsest(scene, kept, fetch, 'lod-meta.json'),
+      await readCoarsestLevel(scene, kept, fetch, 'lod-meta.json'),
       await kept.read(scene.boxes[1].runs[1], fetch),
     ] as const;
   };

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { setImmediate as turn } from 'node:timers/promises';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { readCoarsest, readLodScene, readScene, SogFiles, type SogRun } from '@gaussian-splat/formats';
+import { readCoarsestLevel, readLodScene, readScene, SogFiles, type SogRun } from '@gaussian-splat/formats';
 import { lodFolder, pick, type LodFolder } from '../support/lod-folder.js';
 import { assertHelpful, assertSameCloud } from './support/expect.js';
 import { smallCloud } from './support/small-cloud.js';
@@ -51,7 +51,7 @@ class Server {
 const scene = readLodScene(folder.index, 'lod-meta.json', INDEX);
 const openPart = (path: string): Promise<Uint8Array> => Promise.resolve(folder.files.get(path)!);
 const reading = (level: number | 'all'): ReturnType<typeof readScene> =>
-  readScene(folder.index, { name: 'lod-meta.json', openPart, level });
+  readScene(folder.index, { name: 'lod-meta.json', openFile: openPart, level });
 
 test('the index in both dialects: boxes with their runs, the coarsest first, at absolute addresses', () => {
   assert.equal(scene.boxes.length, 4);
@@ -93,7 +93,7 @@ test('any number of runs may lie in one file', async () => {
   const index = new TextEncoder().encode(
     JSON.stringify({ lodLevels: 1, filenames: ['meta.json'], tree: { children } }),
   );
-  const found = await readScene(index, { name: 'lod-meta.json', openPart: async (path) => sog[path] });
+  const found = await readScene(index, { name: 'lod-meta.json', openFile: async (path) => sog[path] });
   assert.equal(found.count, count);
 });
 
@@ -119,12 +119,12 @@ test('a tree with more boxes below one node than a call has arguments is read, b
     [...Array(count).keys()],
   );
   const open = (path: string): Promise<Uint8Array> => Promise.resolve(files.get(path)!);
-  assert.equal((await readScene(index, { name: 'lod-meta.json', openPart: open })).count, count);
+  assert.equal((await readScene(index, { name: 'lod-meta.json', openFile: open })).count, count);
 });
 
 test('the coarsest runs and the environment are what the reader of whole scenes finds, and no other file is fetched', async () => {
   const server = new Server(folder);
-  const found = await readCoarsest(scene, new SogFiles(), server.fetch, 'lod-meta.json');
+  const found = await readCoarsestLevel(scene, new SogFiles(), server.fetch, 'lod-meta.json');
   assertSameCloud({ ...found, levelRuns: undefined }, await reading(2));
   assert.deepEqual(
     found.levelRuns!.map(({ count, node }) => [node, count]),
@@ -244,7 +244,7 @@ test('a run beyond its file, a file that is missing and a run without anything t
   const nothing = await refusal(new SogFiles().read(runs[0], new Server(faint).fetch));
   assert.equal(nothing.code, 'decode/empty');
   assert.match(nothing.message, /splats 0 to 300/);
-  const broken = readCoarsest(
+  const broken = readCoarsestLevel(
     scene,
     new SogFiles(),
     new Server({ ...folder, files: new Map() }).fetch,
@@ -259,7 +259,7 @@ test('the coarsest level of a large scene is on show before any other is fetched
   let [previewed, fetched] = [0, 0];
   const found = await readScene(large.index, {
     name: 'lod-meta.json',
-    openPart: (path) => {
+    openFile: (path) => {
       log.push(path);
       return Promise.resolve(large.files.get(path)!);
     },

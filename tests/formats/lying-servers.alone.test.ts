@@ -17,7 +17,7 @@ const OTHER = CONTENT.map((byte) => byte ^ 1);
 const BREAK = 100_000;
 /** Waiting is so many times as short here. */
 const HASTE = 12;
-const MOST_BYTES = 2_000_000;
+const MAX_BYTES = 2_000_000;
 
 type Answer = (response: ServerResponse, from: number, request: IncomingMessage) => void;
 
@@ -221,7 +221,7 @@ names.forEach((name, k) => {
   const [outcome] = SERVERS[name];
   test(`${name}: ${outcome}`, { timeout: 120_000 }, async () => {
     const start = performance.now();
-    const options: FetchSceneOptions = { maxBytes: MOST_BYTES };
+    const options: FetchSceneOptions = { maxBytes: MAX_BYTES };
     const found = await fetchScene(`${base}${k}`, options).then(
       (bytes) => (Buffer.compare(bytes, CONTENT) === 0 ? 'right' : `${bytes.length} other bytes`),
       (error: unknown) => (error instanceof GaussianSplatError ? error.code : `unnamed: ${String(error)}`),

@@ -3,8 +3,8 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { constants, deflateRawSync, inflateRawSync } from 'node:zlib';
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import { withNearAxes, writeMotion, type MotionSteps } from '@gaussian-splat/economise';
-import { LoadBudget, movedCloud, readMotion, type Motion } from '@gaussian-splat/formats';
+import { alignAxes, writeMotion, type MotionSteps } from '@gaussian-splat/economise';
+import { LoadBudget, applyMotion, readMotion, type Motion } from '@gaussian-splat/formats';
 import { randomSource } from '../support/gpu.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 
@@ -61,7 +61,7 @@ function covariance({ rotations, scales }: GaussianCloud, i: number): number[] {
 test('each attribute of each frame is as near as its step', async () => {
   const motion = await read(written);
   for (const [frame, asked] of frames.entries()) {
-    const found = movedCloud(first, motion, frame, name, budget());
+    const found = applyMotion(first, motion, frame, name, budget());
     const far = (a: Float32Array, b: Float32Array): number =>
       a.reduce((most, value, i) => Math.max(most, Math.abs(value - b[i])), 0);
     assert.ok(far(found.positions, asked.positions) < 6 * STEPS.position, `positions of ${frame}`);
@@ -90,7 +90,7 @@ test('what does not move costs nothing, and frames whose axes have other names a
     renamed.rotations.set([half * (w - z), half * (x + y), half * (y - x), half * (z + w)], 4 * i);
     renamed.scales.set([first.scales[3 * i + 1], first.scales[3 * i]], 3 * i);
   }
-  const back = withNearAxes(renamed, first);
+  const back = alignAxes(renamed, first);
   const again = writeMotion(first, [back, back], { steps: STEPS, deflate });
   assert.ok(again.length < 1_000, `${again.length} bytes`);
 });
@@ -141,7 +141,7 @@ test('whatever a file announces is charged before it is there, and hostile ones 
     assert.match(code, /^(read|decode\/(corrupt|truncated|header|unsupported)|out-of-memory\/budget)$/);
     if (code !== 'read') continue;
     try {
-      movedCloud(first, await read(bytes), FRAMES - 1, name, budget());
+      applyMotion(first, await read(bytes), FRAMES - 1, name, budget());
     } catch (error) {
       assert.ok(error instanceof GaussianSplatError && error.code === 'decode/empty', String(error));
     }

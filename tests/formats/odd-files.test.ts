@@ -123,7 +123,7 @@ function glb(json: object, binary: Uint8Array | undefined, pad: string, behind: 
 test('a GLB may be padded with zeros, and what stands behind its end is not part of it', async () => {
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(6, 1) }]], [{ mesh: 0 }], [0]);
   const [own, beside] = [{ byteLength: buffer.length }, { uri: 'a.bin', byteLength: buffer.length }];
-  const read = (file: Uint8Array) => readScene(file, { name: 'a.glb', openPart: async () => buffer });
+  const read = (file: Uint8Array) => readScene(file, { name: 'a.glb', openFile: async () => buffer });
   const direct = await read(glb({ ...json, buffers: [own] }, buffer, ' ', ''));
   for (const [pad, behind] of [
     ['\0', ''],

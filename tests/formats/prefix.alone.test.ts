@@ -72,7 +72,7 @@ test('a large scene is previewed before it is whole', { skip: needsSharedData },
   const previews: [count: number, degree: number][] = [];
   const cloud = await readScene(sharedFile(`${folder}meta.json`), {
     name: 'meta.json',
-    openPart,
+    openFile: openPart,
     onPreview: ({ count, shDegree }) => void previews.push([count, shDegree]),
   });
   assert.deepEqual([cloud.count, cloud.shDegree], [250_000, 2]);

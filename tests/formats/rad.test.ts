@@ -8,7 +8,7 @@ import { writeRad, type RadOptions } from './support/rad-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 
 const read = (files: Record<string, Uint8Array>, name = 'scene.rad'): Promise<GaussianCloud> =>
-  readScene(files[name], { name, openPart: (path) => Promise.resolve(files[path]) });
+  readScene(files[name], { name, openFile: (path) => Promise.resolve(files[path]) });
 
 function assertNear(found: ArrayLike<number>, expected: ArrayLike<number>, tolerance: number, what: string): void {
   assert.equal(found.length, expected.length, what);

@@ -45,7 +45,7 @@ describe('one captured scene in seven files', { skip: needsSharedData }, () => {
       assertAtMost(largestRotationError(spz, ply), rotationBound, 'rotations');
       assertAtMost(largestDifference(spz.opacities, ply.opacities), 0.5 / 255 + 1e-6, 'opacities: half a byte');
       assertScales(spz, ply);
-      assertColours(spz, ply);
+      assertColors(spz, ply);
     });
   }
 
@@ -78,7 +78,7 @@ function assertScales(spz: GaussianCloud, ply: GaussianCloud): void {
  * Half a step, with values clamped to the format's range: constant terms ±1/0.3 in 255 steps, others -1..127/128 in
  * steps of 1/128, of which Niantic's packer keeps 5 bits for degree 1 and 4 bits above.
  */
-function assertColours(spz: GaussianCloud, ply: GaussianCloud): void {
+function assertColors(spz: GaussianCloud, ply: GaussianCloud): void {
   for (let k = 0; k < 9; k++) {
     const [low, high] = k === 0 ? [-1 / 0.3, 1 / 0.3] : [-1, 127 / 128];
     const bound = k === 0 ? 0.5 / 255 / 0.15 : (k < 4 ? 4.5 : 8.5) / 128;

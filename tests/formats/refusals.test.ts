@@ -65,13 +65,16 @@ test('pages and pointers in place of a part of a scene are told as such', async 
     [lod, '0/sh0.webp', pointer, 'decode/lfs-pointer', /0\/meta\.json, sh0\.webp .*git lfs pull/],
   ];
   for (const [scene, path, bytes, code, message] of cases) {
-    await expectRefusal(scene, code, message, { name: 'scene.json', openPart: brings(path, bytes) });
-    assert.ok(await readScene(scene, { openPart: brings('', bytes) }));
+    await expectRefusal(scene, code, message, { name: 'scene.json', openFile: brings(path, bytes) });
+    assert.ok(await readScene(scene, { openFile: brings('', bytes) }));
   }
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
   const gltf = text(JSON.stringify({ ...json, buffers: [{ uri: 'a.bin', byteLength: buffer.length }] }));
   const openPart = brings('a.bin', page);
-  await expectRefusal(gltf, 'decode/html', /scene\.gltf, a\.bin .*web page/, { name: 'scene.gltf', openPart });
+  await expectRefusal(gltf, 'decode/html', /scene\.gltf, a\.bin .*web page/, {
+    name: 'scene.gltf',
+    openFile: openPart,
+  });
   const { boxes } = readLodScene(lod, 'lod-meta.json', 'https://x.test/lod-meta.json');
   const fetch = async (url: string): Promise<Uint8Array> => brings('quats.webp', page)(new URL(url).pathname.slice(3));
   await assert.rejects(new SogFiles().read(boxes[0].runs[0], fetch), /quats\.webp .*web page.*decode\/html/);

@@ -4,7 +4,7 @@ import {
   frameAt,
   framePath,
   isSequence,
-  movedFrame,
+  motionFrame,
   parseSequence,
   sequencePaths,
   type SceneSequence,
@@ -56,9 +56,9 @@ test('every frame is shown for its time', () => {
 test('files of motion have the frames after the first', () => {
   const moving = { gaussianSplatSequence: 2, first: 'a.sog', count: 100, framesPerFile: 48 };
   const named = parseSequence(manifest({ ...moving, motion: 'm-{00}.bin' }), 'a.json');
-  assert.deepEqual([framePath(named, 0), movedFrame(named, 0)], ['a.sog', undefined]);
+  assert.deepEqual([framePath(named, 0), motionFrame(named, 0)], ['a.sog', undefined]);
   assert.deepEqual(
-    [1, 48, 49, 97, 99].map((frame) => movedFrame(named, frame)),
+    [1, 48, 49, 97, 99].map((frame) => motionFrame(named, frame)),
     [
       { path: 'm-00.bin', frame: 0, frames: 48 },
       { path: 'm-00.bin', frame: 47, frames: 48 },
@@ -69,7 +69,7 @@ test('files of motion have the frames after the first', () => {
   );
   assert.deepEqual([...sequencePaths(named)], ['a.sog', 'm-00.bin', 'm-01.bin', 'm-02.bin']);
   const listed = parseSequence(manifest({ ...moving, count: 50, motion: ['x', 'y'] }), 'a.json');
-  assert.deepEqual([movedFrame(listed, 49)?.path, listed.durationSeconds], ['y', 50 / 24]);
+  assert.deepEqual([motionFrame(listed, 49)?.path, listed.durationSeconds], ['y', 50 / 24]);
   const still = parseSequence(manifest({ ...moving, count: 1, motion: [] }), 'a.json');
   assert.deepEqual([...sequencePaths(still)], ['a.sog']);
   for (const [wrong, message] of [

@@ -4,7 +4,14 @@ import { createServer } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { after, before, beforeEach, test } from 'node:test';
 import { partUrl } from '@gaussian-splat/core/fetch';
-import { fetchScene, openPartAt, readCoarsest, readLodScene, readScene, SogFiles } from '@gaussian-splat/formats';
+import {
+  fetchScene,
+  fileOpenerFor,
+  readCoarsestLevel,
+  readLodScene,
+  readScene,
+  SogFiles,
+} from '@gaussian-splat/formats';
 import { lodFolder } from '../support/lod-folder.js';
 import { assertSameCloud } from './support/expect.js';
 import { buildGltf } from './support/gltf-writer.js';
@@ -48,7 +55,7 @@ beforeEach(() => void asked.splice(0));
 
 const read = async (path: string) => {
   const url = `${base}/${path}${QUERY}`;
-  return readScene(await fetchScene(url), { name: path, openPart: openPartAt(url, () => ({ retries: 0 })) });
+  return readScene(await fetchScene(url), { name: path, openFile: fileOpenerFor(url, () => ({ retries: 0 })) });
 };
 
 test('files that a scene names are asked for with its query', async () => {
@@ -61,7 +68,7 @@ test('box by box, too', async () => {
   const index = `${base}/lod/lod-meta.json${QUERY}`;
   const fetch = (url: string): Promise<Uint8Array> => fetchScene(url, { retries: 0 });
   const scene = readLodScene(await fetch(index), 'lod-meta.json', index);
-  assert.ok((await readCoarsest(scene, new SogFiles(), fetch, 'lod-meta.json')).count > 0);
+  assert.ok((await readCoarsestLevel(scene, new SogFiles(), fetch, 'lod-meta.json')).count > 0);
 });
 
 test('a buffer of a glTF keeps a query of its own', async () => {

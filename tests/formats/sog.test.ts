@@ -30,13 +30,13 @@ test('version 2, bundle and folder, give every attribute to the bits of the form
   assertAtMost(largestDifference(read.sh, cloud.sh), 0.02, 'colours');
   const logs = (values: Float32Array): number[] => Array.from(values, Math.log);
   assertAtMost(largestDifference(logs(read.scales), logs(cloud.scales)), 0.1, 'logarithms of scales');
-  const unpacked = await readScene(files['meta.json'], { name: 'meta.json', openPart: folder(files) });
+  const unpacked = await readScene(files['meta.json'], { name: 'meta.json', openFile: folder(files) });
   assert.deepEqual(unpacked, read);
 });
 
 test('version 1 gives every attribute to the bits of the format', async () => {
   const files = writeSogV1(cloud);
-  const read = await readScene(files['meta.json'], { name: 'meta.json', openPart: folder(files) });
+  const read = await readScene(files['meta.json'], { name: 'meta.json', openFile: folder(files) });
   assert.deepEqual([read.count, read.shDegree], [300, 0]);
   assertAtMost(largestRotationError(read, cloud), 3e-5, 'rotations');
   assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.01, 'opacities');
@@ -121,7 +121,7 @@ function huge(): Uint8Array {
 test('where version 2 does not say how many bands it has, the width of their texture tells, as PlayCanvas reads it', async () => {
   const files = writeSog(cloud);
   const read = async (changed: SogFiles) =>
-    readScene(changed['meta.json'], { name: 'meta.json', openPart: folder(changed) });
+    readScene(changed['meta.json'], { name: 'meta.json', openFile: folder(changed) });
   const meta = JSON.parse(new TextDecoder().decode(files['meta.json']));
   delete meta.shN.bands;
   delete meta.shN.count;

@@ -25,7 +25,7 @@ const tile = (uri: string | undefined, more: object = {}): object => ({
 const readTiles = async (files: Files, level?: number): Promise<GaussianCloud> =>
   readScene(files['tileset.json'], {
     ...{ name: 'tileset.json', level },
-    openPart: (path) => (path in files ? Promise.resolve(files[path]) : Promise.reject(new Error(`no ${path}`))),
+    openFile: (path) => (path in files ? Promise.resolve(files[path]) : Promise.reject(new Error(`no ${path}`))),
   });
 const whole = (bytes: Uint8Array): Promise<GaussianCloud> => readScene(bytes, { name: 'a.glb' });
 const worldOf = ({ positions, origin }: GaussianCloud): number[] => [...positions].map((x, k) => x + origin[k % 3]);
@@ -107,19 +107,19 @@ test('tiles without splats are left out with a warning, and a tileset of them is
   const openPart = (): Promise<Uint8Array> => Promise.resolve(mesh);
   await expectRefusal(none, 'decode/unsupported', /KHR_gaussian_splatting.*1 tiles without/, {
     name: 'a.json',
-    openPart,
+    openFile: openPart,
   });
 });
 
 test('what is wrong with a tileset is said', async () => {
   const refused = (root: object, code: string, message: RegExp): Promise<unknown> =>
-    expectRefusal(tileset(root), code, message, { name: 'tileset.json', openPart: () => Promise.resolve(glb(3, 1)) });
+    expectRefusal(tileset(root), code, message, { name: 'tileset.json', openFile: () => Promise.resolve(glb(3, 1)) });
   await refused(tile('a.glb', { implicitTiling: {} }), 'decode/unsupported', /root.*implicit tiling/);
   await refused(tile('a.glb', { transform: [1, 2] }), 'decode/header', /root.transform.*16 numbers/);
   await refused(tile(undefined, { children: [3] }), 'decode/header', /root.children\[0\].*a tile/);
   const itself = tileset(tile('again.json'));
   await expectRefusal(itself, 'decode/header', /at most 16 deep/, {
     name: 'tileset.json',
-    openPart: () => Promise.resolve(itself),
+    openFile: () => Promise.resolve(itself),
   });
 });

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { AttributeSlice } from '@gaussian-splat/core/contract';
-import { compareParts, isDifferent, type ComparedPart } from '@gaussian-splat/generator';
+import { compareOutputs, isDifferent, type OutputDifference } from '@gaussian-splat/generator';
 
 const ROWS = 2000;
 const slice = (
@@ -26,7 +26,7 @@ const rows = (): Float32Array =>
     return column < 3 ? 5 * Math.sin(i) : column < 9 ? 1e-3 * Math.abs(Math.cos(i)) : 30 * Math.sin(i);
   });
 
-const part = (found: Float32Array, expected: Float32Array, start = 0): ComparedPart => ({
+const part = (found: Float32Array, expected: Float32Array, start = 0): OutputDifference => ({
   tensor: 'g',
   dtype: 'float32',
   start,
@@ -36,7 +36,7 @@ const part = (found: Float32Array, expected: Float32Array, start = 0): ComparedP
 const changed = (change: (value: number, i: number) => number): Float32Array => rows().map(change);
 
 test('roundings, and a row that falls to the other side of a threshold, are no difference', () => {
-  const rounded = compareParts(
+  const rounded = compareOutputs(
     [
       part(
         changed((x) => x * (1 + 3e-4)),
@@ -46,7 +46,7 @@ test('roundings, and a row that falls to the other side of a threshold, are no d
     SLICES,
   );
   assert.ok(!isDifferent(rounded) && rounded.error < 1e-3, JSON.stringify(rounded));
-  const flipped = compareParts(
+  const flipped = compareOutputs(
     [
       part(
         changed((x, i) => (i < 10 ? 0 : x)),
@@ -57,7 +57,7 @@ test('roundings, and a row that falls to the other side of a threshold, are no d
   );
   assert.ok(!isDifferent(flipped) && flipped.error > 0.1, JSON.stringify(flipped));
   // Both are opacity 1.
-  const opaque = compareParts(
+  const opaque = compareOutputs(
     [
       part(
         changed((x, i) => (i % 10 === 9 && x > 20 ? 2 * x : x)),
@@ -72,7 +72,7 @@ test('roundings, and a row that falls to the other side of a threshold, are no d
 test('covariances that are wrong are seen beside centres that are a thousand times larger, in a piece from the middle, too', () => {
   for (const start of [0, 7]) {
     const [found, expected] = [changed((x, i) => (i % 10 === 4 ? 1.5 * x : x)), rows()].map((all) => all.slice(start));
-    const comparison = compareParts([part(found, expected, start)], SLICES);
+    const comparison = compareOutputs([part(found, expected, start)], SLICES);
     assert.ok(isDifferent(comparison), JSON.stringify(comparison));
     assert.equal(comparison.where, 'covariances');
   }
@@ -80,13 +80,13 @@ test('covariances that are wrong are seen beside centres that are a thousand tim
 
 test('numbers that are none on one side alone are a difference, and on both are none', () => {
   const nan = changed((x, i) => (i % 10 === 0 ? NaN : x));
-  assert.ok(isDifferent(compareParts([part(nan, rows())], SLICES)));
-  assert.ok(!isDifferent(compareParts([part(nan, nan)], SLICES)));
+  assert.ok(isDifferent(compareOutputs([part(nan, rows())], SLICES)));
+  assert.ok(!isDifferent(compareOutputs([part(nan, nan)], SLICES)));
 });
 
 test('a picture is compared as a whole, float16 with room for its rounding', () => {
   const halves = (value: number): Uint8Array => new Uint8Array(new Uint16Array(64).fill(value).buffer);
-  const picture = (found: number, expected: number): ComparedPart => ({
+  const picture = (found: number, expected: number): OutputDifference => ({
     tensor: 'out',
     dtype: 'float16',
     start: 0,
@@ -94,6 +94,6 @@ test('a picture is compared as a whole, float16 with room for its rounding', () 
     expected: halves(expected),
   });
   // 1 and its neighbour; 1 and 1.5.
-  assert.ok(!isDifferent(compareParts([picture(0x3c01, 0x3c00)])));
-  assert.ok(isDifferent(compareParts([picture(0x3e00, 0x3c00)])));
+  assert.ok(!isDifferent(compareOutputs([picture(0x3c01, 0x3c00)])));
+  assert.ok(isDifferent(compareOutputs([picture(0x3e00, 0x3c00)])));
 });

@@ -32,7 +32,7 @@ const names = readdirSync(root).filter((name) => existsSync(`${root}${name}/mode
 const DAILY: readonly string[] = ['skull', 'walker'];
 /** Decibels by which a picture may be farther from the photograph than it was when the example was made. */
 const TOLERANCE_DB = 0.1;
-const MOST_BYTES = 8e6;
+const MAX_BYTES = 8e6;
 /** GPUBufferUsage.STORAGE and COPY_DST: Node has no such global. */
 const STORAGE_AND_COPY = 0x80 | 0x8;
 
@@ -86,7 +86,7 @@ for (const name of names) {
       const report = await checkModel(`${root}${name}/model.onnx`, { run: true });
       assert.deepEqual(report.faults, []);
       assert.deepEqual(report.warnings, []);
-      assert.ok(read(`${name}/model.onnx`).length <= MOST_BYTES);
+      assert.ok(read(`${name}/model.onnx`).length <= MAX_BYTES);
       const record = readJson(`${name}/record.json`) as Record<string, number>;
       assert.ok(record.held_out_psnr > 20 && record.steps > 1000, 'trained, and measured on what it has not seen');
     },

@@ -8,7 +8,7 @@ import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
 
-const LEAST_DB = 59;
+const MIN_DB = 59;
 after(endNodeDevice);
 
 /** Nearer along the axis of a camera at the origin that looks to +z, but farther away than the other one. */
@@ -39,7 +39,7 @@ for (const target of [
     const [one, other] = [await draw([aside], target, 'distance'), await draw([ahead], target, 'distance')];
     const found = await draw([aside, ahead], target, 'distance');
     const decibels = psnr(found, over(other, one), { channels: 4 });
-    assert.ok(decibels >= LEAST_DB, `${decibels.toFixed(1)} dB`);
+    assert.ok(decibels >= MIN_DB, `${decibels.toFixed(1)} dB`);
     const wrong = psnr(found, over(one, other), { channels: 4 });
     assert.ok(wrong < 40, `${wrong.toFixed(1)} dB the other way around: the splats do not overlap`);
   });

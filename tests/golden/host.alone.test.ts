@@ -5,7 +5,7 @@ import { cameraFromProjection, multiply, type Camera, type Vector3 } from '@gaus
 import {
   capture,
   GaussianBuffers,
-  LinearColours,
+  LinearColors,
   packGaussians,
   SceneDepth,
   settings,
@@ -88,12 +88,12 @@ for (const how of BOTH) {
     const { world, scene } = await skullWorld(device);
     const viewpoint = new Viewpoint(device, world, { settings: how });
     const expected = await capture(device, viewpoint, { camera, over: [...CLEAR, 1] });
-    const colours = new LinearColours(device);
+    const colours = new LinearColors(device);
     for (const format of ['rgba16float', 'rgba8unorm-srgb'] as const) {
       const texture = target(device, format);
       const encoder = device.createCommandEncoder();
       clear(encoder, texture, CLEAR.map(decode));
-      viewpoint.record(encoder, camera, { target: texture, over: 'target', colours });
+      viewpoint.record(encoder, camera, { target: texture, over: 'target', colors: colours });
       device.queue.submit([encoder.finish()]);
       const found = await readTexture(device, texture);
       const isEncoded = format.endsWith('-srgb');
@@ -125,7 +125,7 @@ test('several views at once are as each alone, and keep their buffers', async ()
   const small: Camera = { ...camera, width: 48, height: 32, fx: camera.fx / 2, fy: camera.fy / 2, cx: 24, cy: 16 };
   const cameras = [camera, right, small];
   const targets = cameras.map((each) => target(device, 'rgba8unorm', each));
-  const views = cameras.map((each, k) => ({ camera: each, picture: { target: targets[k] } }));
+  const views = cameras.map((each, k) => ({ camera: each, target: { target: targets[k] } }));
   viewpoint.drawAll(views);
   const found = await Promise.all(targets.map((texture) => readTexture(device, texture)));
   for (const [k, each] of cameras.entries()) {

@@ -10,7 +10,7 @@ import { psnr } from '../support/metrics.js';
 import { onlyInFull } from '../support/extent.js';
 import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { randomSource } from '../support/gpu.js';
-import { cameraAt, equalDepthPlane, movedBy, offCentre, resized, room, withHostileSplats } from '../support/scenes.js';
+import { cameraAt, equalDepthPlane, movedBy, offCenter, resized, room, withHostileSplats } from '../support/scenes.js';
 import { capture, Renderer } from '../support/renderer.js';
 
 const sameBytes = (a: Float32Array, b: Float32Array): boolean =>
@@ -84,7 +84,7 @@ test('an image of no splats is the background', async () => {
 
 test('background shines through by transmittance, premultiplied', async () => {
   const device = await anyDevice();
-  const { cloud, cameras } = offCentre();
+  const { cloud, cameras } = offCenter();
   const renderer = new Renderer(device);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const clear = await capture(device, renderer, { gaussians, camera: cameras[0] });
@@ -115,7 +115,7 @@ test('a scene in several buffers is the same image as in one', async () => {
 
 test('a moving camera allocates nothing, compiles nothing and reads nothing back', async () => {
   const device = await anyDevice();
-  const { cloud, cameras } = offCentre();
+  const { cloud, cameras } = offCenter();
   const renderer = new Renderer(device);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const target = device.createTexture({ size: [64, 48], format: 'rgba8unorm', usage: 0x10 });
@@ -163,10 +163,10 @@ function spyOnAllocations(device: GPUDevice): { names: string[]; submits: number
 
 test('a scene a million units from the origin looks as at the origin', async () => {
   const device = await anyDevice();
-  const { cloud, cameras } = offCentre();
+  const { cloud, cameras } = offCenter();
   const here = await renderCloud(device, cloud, cameras[0], 'classic');
   // Powers of two, so that the camera's own float64 position loses nothing.
-  const moved = movedBy(offCentre(), [2 ** 20, -(2 ** 21), 2 ** 19]);
+  const moved = movedBy(offCenter(), [2 ** 20, -(2 ** 21), 2 ** 19]);
   const there = await renderCloud(device, moved.cloud, moved.cameras[0], 'classic');
   assert.ok(psnr(here, there, { channels: 4 }) > 75, `${psnr(here, there, { channels: 4 })} dB`);
 });

@@ -22,7 +22,7 @@ const CAPTURED: Record<Quality, number> = { ...LIMITS, balanced: 50, fast: 44 };
 /** Of 1: what is seen. */
 const VISIBLE = 16 / 255;
 /** Share of a captured scene's pixels that may be off by that. */
-const MOST_VISIBLE = 0.001;
+const MAX_VISIBLE = 0.001;
 
 const skull = await readScene(readFileSync(new URL('../../demo/scenes/skull.spz', import.meta.url)), {
   name: 'skull.spz',
@@ -113,7 +113,7 @@ for (const { name, cloud, camera, isCaptured, withoutTiles } of daily) {
         console.log(describeCloseness(what, close), seen);
         const least = (isCaptured ? CAPTURED : LIMITS)[quality];
         assert.ok(close.psnr >= least, `${what}: ${close.psnr} dB`);
-        assert.ok(isCaptured ? share < MOST_VISIBLE : alpha <= VISIBLE, `${what}: ${seen}`);
+        assert.ok(isCaptured ? share < MAX_VISIBLE : alpha <= VISIBLE, `${what}: ${seen}`);
       }
       gaussians.destroy();
     }

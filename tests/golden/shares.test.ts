@@ -6,8 +6,8 @@ import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import {
   JoinedBlocks,
   layoutOf,
-  packShare,
-  SHARE_SPLATS,
+  packShard,
+  SHARD_SPLATS,
   ShareCells,
   sortBlock,
   type ShareLayout,
@@ -68,21 +68,21 @@ const KINDS: Readonly<Record<string, Kind>> = {
   'of degree 1': { shDegree: 1 },
   'of degree 2': { shDegree: 2, shine: 0.3 },
   'that is flat': { isFlat: true },
-  'of one share and a little': { count: SHARE_SPLATS + 1 },
+  'of one share and a little': { count: SHARD_SPLATS + 1 },
   'that is small': { count: 700 },
 };
 
 const partsOf = (whole: GaussianCloud): GaussianCloud[] => {
   const parts = [];
-  for (let first = 0; first < whole.count; first += SHARE_SPLATS)
-    parts.push(keepUsable(part(whole, first, Math.min(whole.count, first + SHARE_SPLATS))));
+  for (let first = 0; first < whole.count; first += SHARD_SPLATS)
+    parts.push(keepUsable(part(whole, first, Math.min(whole.count, first + SHARD_SPLATS))));
   return parts;
 };
 
 /** Packs parts by a layout, and by another if the scene asks for it. */
 function joined(parts: readonly GaussianCloud[], layout: ShareLayout, rows: number): JoinedBlocks {
   const cells = new ShareCells(layout);
-  const shares = parts.map((cloud) => packShare(cloud, layout));
+  const shares = parts.map((cloud) => packShard(cloud, layout));
   for (const share of shares) cells.add(share);
   const needed = cells.layoutFor();
   if (needed !== layout) return joined(parts, needed, rows);
@@ -147,8 +147,8 @@ test('a layout by the first share of a file in spatial order keeps neighbors tog
 });
 
 test('a scene whose end lies in planes keeps the order of its file', () => {
-  const whole = scene({ count: 4 * SHARE_SPLATS });
-  for (let i = SHARE_SPLATS; i < whole.count; i++) whole.positions[3 * i + 1] = i % 8;
+  const whole = scene({ count: 4 * SHARD_SPLATS });
+  for (let i = SHARD_SPLATS; i < whole.count; i++) whole.positions[3 * i + 1] = i % 8;
   const parts = partsOf(whole);
   const kept = keepUsable(part(whole, 0, whole.count));
   const { packed } = joined(parts, layoutOf(parts[0], 'int8'), whole.count);

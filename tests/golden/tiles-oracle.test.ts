@@ -15,7 +15,7 @@ import {
   edgeOnDiscs,
   hugeSplats,
   needles,
-  offCentre,
+  offCenter,
   opacityLadder,
   resized,
 } from '../support/scenes.js';
@@ -30,7 +30,7 @@ const LIMITS = { psnr: 69, p999: 0.5 / 255 };
  */
 const worstOf = (scene: string): number => (scene === 'brightColors' ? 4.3 : 1.1) / 255;
 
-for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs, offCentre]) {
+for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs, offCenter]) {
   test(`tiles: ${make.name}`, async () => {
     const { name, cloud, cameras } = make();
     for (const [i, whole] of cameras.entries()) {
@@ -71,7 +71,7 @@ test('tiles: an adapter that cuts off what float16 has no room for stores the sa
 });
 
 test('tiles: bytes are the nearest, on an adapter that cuts off, too', async () => {
-  const { cloud, cameras } = offCentre();
+  const { cloud, cameras } = offCenter();
   const camera = resized(cameras[0], 100);
   const { device, befallen } = await cutsOff('floor(saturate(result) * 255.0) / 255.0');
   const [exact, cut] = [await bytesOf(await anyDevice(), cloud, camera), await bytesOf(device, cloud, camera)];

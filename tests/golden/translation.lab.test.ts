@@ -8,7 +8,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
-import { cameraAt, offCentre, resized, room } from '../support/scenes.js';
+import { cameraAt, offCenter, resized, room } from '../support/scenes.js';
 import { capture, Renderer } from '../support/renderer.js';
 
 /** The camera moved along its own axes (right, down, forward) and then turned to the right by an angle in radians. */
@@ -29,7 +29,7 @@ const steps = [
   [0.1, 0.1, -2],
 ];
 
-for (const make of [room, offCentre]) {
+for (const make of [room, offCenter]) {
   for (const rasterizer of ['quads', 'tiles'] as const) {
     test(`${make.name}, ${rasterizer}: a camera that moves without turning sees the image of the oracle`, async () => {
       const device = await anyDevice();
@@ -55,7 +55,7 @@ test('several scenes are drawn in their common order while the camera moves', as
   const { cloud, cameras } = room();
   const start = resized(cameras[0], 160);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
-  const other = offCentre();
+  const other = offCenter();
   const second = await GaussianBuffers.upload(device, packGaussians(other.cloud));
   const [moving, fresh] = [new Renderer(device), new Renderer(device)];
   const scenes = [gaussians, second];

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as delay } from 'node:timers/promises';
-import { autotune, GaussianBuffers, packGaussians, startVariants, type Variants } from '@gaussian-splat/renderer';
+import { autotune, GaussianBuffers, packGaussians, pickInitialVariants, type Variants } from '@gaussian-splat/renderer';
 import { passesSelfTest, mortonOrder, packSpheres, ROUNDS, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull } from '../support/extent.js';
@@ -150,7 +150,7 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   let pipelines = 0;
   const make = device.createComputePipeline.bind(device);
   device.createComputePipeline = (descriptor) => (pipelines++, make(descriptor));
-  const begun = await startVariants(device, { store, quickMs: Infinity });
+  const begun = await pickInitialVariants(device, { store, maxFrameMs: Infinity });
   assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' });
   assert.equal(new Renderer(device).resolvedSettings.rasterizer, 'tiles');
   assert.equal(entries.size, 0, 'nothing that was not measured is kept');
@@ -171,7 +171,11 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
 
   const later = await deviceLikeAny();
   const pause = () => assert.fail('nothing is looked for');
-  assert.deepEqual(await startVariants(later, { store, quickMs: 0, pause }), chosen, 'what an earlier visit found');
+  assert.deepEqual(
+    await pickInitialVariants(later, { store, maxFrameMs: 0, pause }),
+    chosen,
+    'what an earlier visit found',
+  );
   assert.deepEqual(await autotune(later, { store, pause }), chosen);
   later.destroy();
 });
@@ -180,7 +184,7 @@ test('what is likely is not drawn with where it is slow', { skip: onlyInFull }, 
   const device = await deviceLikeAny();
   const isLookedFor = new Promise<void>((resolve) => {
     const pause = () => new Promise<void>(() => resolve());
-    void startVariants(device, { store: null, quickMs: 0, pause });
+    void pickInitialVariants(device, { store: null, maxFrameMs: 0, pause });
   });
   await isLookedFor;
   assert.equal(new Renderer(device).resolvedSettings.rasterizer, 'quads', 'what works everywhere, until that is found');
@@ -191,7 +195,7 @@ test('nor where the adapter says that it is a processor', async (t) => {
   const processor = await newDevice();
   if (!processor.adapterInfo.isFallbackAdapter) return t.skip('this adapter is a GPU');
   const entries = new Map<string, string>();
-  const begun = await startVariants(processor, { store: storeOf(entries), quickMs: Infinity });
+  const begun = await pickInitialVariants(processor, { store: storeOf(entries), maxFrameMs: Infinity });
   await assertSuits(processor, begun);
   assert.deepEqual(JSON.parse([...entries.values()][0]), begun);
   processor.destroy();

@@ -94,7 +94,7 @@ interface Trimmed {
 }
 
 /** The least of a variance that trimming keeps, and the least mass that is seen. */
-const [LEAST_VARIANCE, LEAST_MASS] = [0.01, 0.004];
+const [MIN_VARIANCE, MIN_MASS] = [0.01, 0.004];
 
 /**
  * What a cut that hides leaves of a splat: the Gaussian whose mass, mean and variance along each coordinate of the shape are those of the splat times the opacity of the cut at each place,
@@ -106,7 +106,7 @@ function trim(splat: Trimmed, cloud: GaussianCloud, i: number, cut: SplatCut, sc
   const inside = limits.reduce((product, { share }) => product * share, 1);
   const share = side === 'outside' ? 1 - inside : inside;
   const mass = 1 - (1 - opacity) * share;
-  if (edge === 'hard' || share <= 0 || share >= 1 || mass >= 1 || mass <= LEAST_MASS)
+  if (edge === 'hard' || share <= 0 || share >= 1 || mass >= 1 || mass <= MIN_MASS)
     return { ...splat, opacity: splat.opacity * mass };
   const [base, sign] = side === 'outside' ? [opacity, 1] : [1, -1];
   const found = rotationTimesScale(cloud, i);
@@ -116,7 +116,7 @@ function trim(splat: Trimmed, cloud: GaussianCloud, i: number, cut: SplatCut, sc
     const weight = sign * (1 - opacity) * Math.min(inside / each.share, 1);
     const mean = (weight * each.own * (density(each.low) - density(each.high))) / mass;
     const inner = each.share + each.own ** 2 * (weighted(each.low) - weighted(each.high));
-    const kept = Math.min(1, Math.max(LEAST_VARIANCE, (base + weight * inner) / mass - mean * mean));
+    const kept = Math.min(1, Math.max(MIN_VARIANCE, (base + weight * inner) / mass - mean * mean));
     const size = Math.hypot(...each.spread);
     position = position.map((value, row) => value + (mean * dot(found[row], each.spread)) / size);
     // The gradient of the same coordinate, in the axes as they are by now: found · spread is the covariance times it.

@@ -10,7 +10,7 @@ import {
   equalDepthPlane,
   hugeSplats,
   needles,
-  offCentre,
+  offCenter,
   OPACITY_STEPS,
   opacityLadder,
 } from '../support/scenes.js';
@@ -134,8 +134,8 @@ test('each scene has in it what it is named for', () => {
   assert.deepEqual([plane.cloud.count, depths.size], [100_000, 1]);
 
   assert.ok(
-    offCentre().cameras.some(({ cx, width }) => cx < 0 || cx > width),
-    'offCentre: principal point outside the image',
+    offCenter().cameras.some(({ cx, width }) => cx < 0 || cx > width),
+    'offCenter: principal point outside the image',
   );
 });
 

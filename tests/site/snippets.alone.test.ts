@@ -47,7 +47,7 @@ declare global {
   const contract: Contract;
   const boundsOf: typeof core.boundsOf;
   const gaussianLayout: typeof layoutOf;
-  const views: economise.DealtViews;
+  const views: economise.ViewSplit;
   const gaussians: drawing.GaussianBuffers;
   const roomGaussians: drawing.GaussianBuffers;
   const plantGaussians: drawing.GaussianBuffers;

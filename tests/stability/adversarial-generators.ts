@@ -17,7 +17,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
 import { nodeDevice } from '../support/node-device.js';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import { differingBytes, resized, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
@@ -30,7 +30,7 @@ const SPEC = {
   quaternionOrder: 'wxyz',
   dtype: 'float32',
 } as const;
-const { cloud, cameras } = offCentre();
+const { cloud, cameras } = offCenter();
 const camera = resized(cameras[0], 72);
 const written = writeTensors(cloud, SPEC);
 const [tensorName, words] = Object.entries(written.tensors)[0];

@@ -14,7 +14,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { autotune, GaussianBuffers, packGaussians, type Variants } from '@gaussian-splat/renderer';
 import { passesSelfTest } from '@gaussian-splat/renderer/stages';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import type { Miscompilation } from '../support/miscompilation.js';
 import { faultyDevice, fullDevice } from './support/devices.js';
 import { compareImage, resized, truth } from './support/pictures.js';
@@ -36,7 +36,7 @@ const FAULTS: readonly { name: string; fault: Miscompilation; expected: Partial<
 ];
 
 async function drawAsChosen(device: GPUDevice): Promise<number> {
-  const { cloud, cameras } = offCentre();
+  const { cloud, cameras } = offCenter();
   const camera = resized(cameras[0], 96);
   await autotune(device);
   const renderer = new Renderer(device);

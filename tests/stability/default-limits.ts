@@ -15,7 +15,7 @@ import { DynamicGaussians, GaussianBuffers, packGaussians } from '@gaussian-spla
 import { GpuMemory } from '@gaussian-splat/renderer/stages';
 import { writeTensors } from '../support/generator-tensors.js';
 import { nodeDevice } from '../support/node-device.js';
-import { cameraAt, offCentre } from '../support/scenes.js';
+import { cameraAt, offCenter } from '../support/scenes.js';
 import { spreadOver, visiblePart } from './support/large-scene.js';
 import { watchMemory } from './support/ledger.js';
 import { compareImage, truth, THREADS } from './support/pictures.js';
@@ -62,14 +62,14 @@ test('what the limits do not allow is refused by name, and leaves nothing behind
 
 test('a scene over the budget of memory is refused before a byte is allocated', async () => {
   const device = await nodeDevice();
-  const packed = packGaussians(offCentre().cloud);
+  const packed = packGaussians(offCenter().cloud);
   const bytes = packed.geometry.byteLength + packed.sh.byteLength + packed.chunks.byteLength;
   const ledger = watchMemory(device);
   await assert.rejects(
     GaussianBuffers.upload(device, packed, { memoryBudget: bytes - 1 }),
     isHelpful('out-of-memory/budget'),
   );
-  const { layout } = writeTensors(offCentre().cloud, {
+  const { layout } = writeTensors(offCenter().cloud, {
     ...({ layout: 'packed', shape: 'scale', color: 'rgb', opacity: 'linear' } as const),
     ...({ quaternionOrder: 'wxyz', dtype: 'float32' } as const),
   });

@@ -12,13 +12,13 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import { percentile } from '../support/metrics.js';
 import { deviceWith } from './support/devices.js';
 import { differingBytes, draw, RASTERIZERS, resized } from './support/pictures.js';
 import { holds, isFull } from './support/row.js';
 
-const { cloud, cameras } = offCentre();
+const { cloud, cameras } = offCenter();
 const camera = resized(cameras[0], 64);
 const kept = new URL('corpus/off-centre-64.f32', import.meta.url);
 

@@ -53,7 +53,7 @@ const view = fc.record({
 for (const rasterizer of RASTERIZERS) {
   test(`any camera, ${rasterizer}`, async () => {
     const device = await nodeDevice();
-    let [worst, offCentre] = [Infinity, 0];
+    let [worst, offCenter] = [Infinity, 0];
     await fc.assert(
       fc.asyncProperty(view, async ({ fovDegrees, shift, aspect, eye, matrix }) => {
         const base = cameraAt([4 * eye[0], 4 * eye[1], 4 * eye[2]], [0.1, 0.2, 0], {
@@ -68,7 +68,7 @@ for (const rasterizer of RASTERIZERS) {
           cy: base.cy + shift[1] * base.height,
           worldToCamera: matrix ? multiply(matrix, base.worldToCamera) : base.worldToCamera,
         };
-        offCentre = Math.max(offCentre, Math.hypot(...toCamera(camera, eyeOf(camera.worldToCamera))));
+        offCenter = Math.max(offCenter, Math.hypot(...toCamera(camera, eyeOf(camera.worldToCamera))));
         const { psnr } = await compare(device, cloud, camera, { rasterizer });
         worst = Math.min(worst, psnr);
         return psnr >= 59;
@@ -76,7 +76,7 @@ for (const rasterizer of RASTERIZERS) {
       { numRuns: rasterizer === 'quads' ? sized(25, 500) : sized(6, 500), seed: 19 },
     );
     holds('S19', `cameras at random, ${rasterizer}, worst`, worst, { atLeast: 59, unit: 'dB' });
-    holds('S19', 'distance of the eye that colours are seen from to the true one', offCentre, {
+    holds('S19', 'distance of the eye that colours are seen from to the true one', offCenter, {
       atMost: 1e-9,
       unit: 'units',
     });

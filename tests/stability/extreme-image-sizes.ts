@@ -14,12 +14,12 @@ import assert from 'node:assert/strict';
 import fc from 'fast-check';
 import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { nodeDevice } from '../support/node-device.js';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import { compareImage, differingBytes, RASTERIZERS, truth, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
-const { cloud, cameras } = offCentre();
+const { cloud, cameras } = offCenter();
 const sizedTo = (width: number, height: number) => ({
   ...cameras[0],
   width,

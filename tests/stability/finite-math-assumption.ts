@@ -13,7 +13,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { GaussianBuffers, packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import { nodeDevice } from '../support/node-device.js';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import { differingBytes, notFinite, RASTERIZERS, resized, THREADS } from './support/pictures.js';
 import { holds } from './support/row.js';
 import { shaderTexts } from './support/sources.js';
@@ -67,7 +67,7 @@ function without({ geometry, ...packed }: PackedGaussians, bad: ReadonlySet<numb
 for (const rasterizer of RASTERIZERS) {
   test(`bits that no CPU has checked, ${rasterizer}`, async () => {
     const device = await nodeDevice();
-    const { cloud, cameras } = offCentre();
+    const { cloud, cameras } = offCenter();
     const camera = resized(cameras[0], 120);
     const packed = packGaussians(cloud);
     const { spoilt, bad } = withBadBits(packed);

@@ -16,12 +16,12 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
-import { movedBy, offCentre, type Scene } from '../support/scenes.js';
+import { movedBy, offCenter, type Scene } from '../support/scenes.js';
 import { draw, RASTERIZERS, resized, truth } from './support/pictures.js';
 import { chart, holds, note, sized } from './support/row.js';
 
 const FAR: Vector3 = [1_000_000, -2_345_678.9, 1_234_567.8];
-const base = offCentre();
+const base = offCenter();
 const scene: Scene = { ...base, cameras: [resized({ ...base.cameras[0], cx: 180, cy: 135 }, 120)] };
 
 /** The camera moved aside so that what is 3 units away moves by a number of pixels. */

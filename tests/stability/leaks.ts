@@ -12,7 +12,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { DynamicGaussians, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { watchMemory } from './support/ledger.js';
 import { resized, yawed, THREADS } from './support/pictures.js';
@@ -27,7 +27,7 @@ const SPEC = {
   quaternionOrder: 'wxyz',
   dtype: 'float32',
 } as const;
-const { cloud, cameras } = offCentre();
+const { cloud, cameras } = offCenter();
 const packed = packGaussians(cloud);
 const written = writeTensors(cloud, SPEC);
 

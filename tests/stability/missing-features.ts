@@ -13,7 +13,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { compareImage, differingBytes, RASTERIZERS, resized, truth } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
@@ -36,7 +36,7 @@ test('each feature removed, then all', async () => {
     ),
     [],
   ];
-  const { cloud, cameras } = offCentre();
+  const { cloud, cameras } = offCenter();
   const camera = resized(cameras[0], 96);
   const oracle = truth(cloud, camera);
   const first = new Map<string, Float32Array>();

@@ -19,7 +19,7 @@ import { writeTensors } from '../support/generator-tensors.js';
 import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
-import { offCentre } from '../support/scenes.js';
+import { offCenter } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { resized, rolled, yawed, THREADS } from './support/pictures.js';
 import { fullTest, holds, sized } from './support/row.js';
@@ -33,7 +33,7 @@ const SPEC = {
   quaternionOrder: 'wxyz',
   dtype: 'float32',
 } as const;
-const { cloud, cameras } = offCentre();
+const { cloud, cameras } = offCenter();
 const written = writeTensors(cloud, SPEC);
 const [tensorName, words] = Object.entries(written.tensors)[0];
 

@@ -15,12 +15,12 @@ import assert from 'node:assert/strict';
 import { DynamicGaussians, packGaussians } from '@gaussian-splat/renderer';
 import { writeTensors } from '../support/generator-tensors.js';
 import { nodeDevice } from '../support/node-device.js';
-import { offCentre, room, withHostileSplats } from '../support/scenes.js';
+import { offCenter, room, withHostileSplats } from '../support/scenes.js';
 import { differingBytes, draw, RASTERIZERS, resized, THREADS } from './support/pictures.js';
 import { holds, sized } from './support/row.js';
 import { capture, Renderer } from '../support/renderer.js';
 
-const scene = sized(offCentre, room)();
+const scene = sized(offCenter, room)();
 const camera = resized(scene.cameras[0], 120);
 
 for (const rasterizer of RASTERIZERS) {

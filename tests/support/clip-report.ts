@@ -17,7 +17,7 @@ import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 import { codeClip, type CodedClip } from '@gaussian-splat/economise';
 import { CLIP_HEAD_BYTES, clipIndexBytes, parseClip, writeClipHead, type ClipIndex } from '@gaussian-splat/formats';
-import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
+import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { deflate, deflateQuickly, encodeWebp } from '../../packages/cli/src/lib/encoders.mjs';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { fountain } from './scenes/fountain.js';
@@ -46,7 +46,7 @@ else await codeFrames(Number(values.from), Number(values.until), values.out!);
 async function codeFrames(from: number, until: number, out: string): Promise<void> {
   const adapter = await requestNodeAdapter({ isTrusted: true });
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
-  await startVariants(device, { format: 'rgba8unorm' });
+  await pickInitialVariants(device, { format: 'rgba8unorm' });
   const frameOf = fountain({ splats, frames, framesPerSecond: FRAMES_PER_SECOND });
   const begin = performance.now();
   const { bytes, ...facts } = await codeClip({

@@ -3,7 +3,7 @@ import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
 import type { DetailManifest } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
-  codingOf,
+  codingFor,
   writePages,
   type DetailTreeOptions,
   type PageSteps,
@@ -29,7 +29,7 @@ export function detailFolder(
 ): DetailFolder {
   const files = new Map<string, ArrayBuffer>();
   const manifest = writePages(buildDetailTree(cloud, options), {
-    coded: coded && { coding: codingOf(coded.steps), deflate: coded.deflate },
+    coded: coded && { coding: codingFor(coded.steps), deflate: coded.deflate },
     places,
     put: (path, bytes) => files.set(path, bytes.buffer),
   });

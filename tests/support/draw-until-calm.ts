@@ -5,7 +5,7 @@ import type { Renderer } from './renderer.js';
 
 /** Frames in a row in which nothing comes any more, and frames at most. */
 const CALM = 10;
-const MOST_FRAMES = 3000;
+const MAX_FRAMES = 3000;
 
 /** Draws a streamed scene until nothing more comes. */
 export async function drawUntilCalm(
@@ -16,7 +16,7 @@ export async function drawUntilCalm(
 ): Promise<void> {
   const device = await anyDevice();
   const target = device.createTexture({ size: [camera.width, camera.height], format: 'rgba8unorm', usage: 0x10 });
-  for (let [calm, frames] = [0, 0]; calm < CALM && frames < MOST_FRAMES; frames++) {
+  for (let [calm, frames] = [0, 0]; calm < CALM && frames < MAX_FRAMES; frames++) {
     const { resident } = scene.progress;
     renderer.render({ gaussians: scene, camera, target, detail });
     await device.queue.onSubmittedWorkDone();

@@ -1,9 +1,9 @@
 /** A streamed SOG scene whose folder lies in memory, and the real one of the shared data. */
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { readCoarsest, readLodScene, SogFiles } from '@gaussian-splat/formats';
+import { readCoarsestLevel, readLodScene, SogFiles } from '@gaussian-splat/formats';
 import { StreamedGaussians, type PageSource, type PoolOptions } from '@gaussian-splat/renderer';
 import {
-  layOutLevels,
+  layoutLevels,
   levelSource,
   packLevelPage,
   type LevelPage,
@@ -108,9 +108,9 @@ export async function openLod(
   const lod = readLodScene(index, 'lod-meta.json', `${ADDRESS}lod-meta.json`);
   const fetchBytes = (url: string, signal: AbortSignal): Promise<Uint8Array> =>
     fetch(decodeURIComponent(url.slice(ADDRESS.length)), signal);
-  const coarsest = await readCoarsest(lod, files, fetchBytes, 'lod-meta.json');
+  const coarsest = await readCoarsestLevel(lod, files, fetchBytes, 'lod-meta.json');
   const boxes = lod.boxes.map((box) => ({ ...box, counts: box.runs.map(({ count }) => count) }));
-  const levels = layOutLevels(coarsest, boxes);
+  const levels = layoutLevels(coarsest, boxes);
   const fetchLevel = async (page: LevelPage, signal: AbortSignal): Promise<Uint32Array<ArrayBuffer>> =>
     packLevelPage(await files.read(lod.boxes[page.box].runs[page.level], fetchBytes, signal), page, levels.scene);
   const source = levelSource(levels, fetchLevel);

@@ -25,7 +25,7 @@ export default function stability() {
 const number = (value) => String(typeof value === 'number' ? Number(value.toPrecision(4)) : value);
 
 /** dB that a scene may cost a renderer against what it has on an ordinary one. */
-const MOST_LOSS = 6;
+const MAX_LOSS = 6;
 
 function describePages(pages) {
   const subjects = subjectsOf(pages);
@@ -52,7 +52,7 @@ function resultOf({ figure, unit, passes, error } = {}, ordinary) {
   if (error !== undefined) return { text: error, isLoss: true };
   if (passes === undefined) return { text: '', isLoss: false };
   const loss = unit === 'dB' && typeof figure === 'number' ? ordinary - figure : undefined;
-  const isLoss = loss === undefined ? !passes : loss > MOST_LOSS;
+  const isLoss = loss === undefined ? !passes : loss > MAX_LOSS;
   return {
     text: `${number(figure)} ${unit}`,
     isLoss,

@@ -1,11 +1,11 @@
 /** Exports for the checker's page, without dependencies on Node. */
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import {
-  compareParts,
+  compareOutputs,
   GeneratorSession,
   isDifferent,
   readTensors,
-  type ComparedPart,
+  type OutputDifference,
   type GeneratorModel,
   type Inputs,
 } from '@gaussian-splat/generator';
@@ -78,7 +78,7 @@ function verdictOf({ outputs, layout }: GeneratorModel, expected: Outputs, { byt
     const [found, rows] = [String(dims[other.name]), String(expected[other.name].dims)];
     return { cell: `${other.name} [${found}] on the GPU`, faults: [differs(other.name, `[${rows}]`, `[${found}]`)] };
   }
-  const parts = outputs.map(({ name, dtype }): ComparedPart => {
+  const parts = outputs.map(({ name, dtype }): OutputDifference => {
     const { buffer, byteOffset, byteLength } = expected[name].data as unknown as Uint8Array;
     return {
       tensor: name,
@@ -88,7 +88,7 @@ function verdictOf({ outputs, layout }: GeneratorModel, expected: Outputs, { byt
       expected: new Uint8Array(buffer, byteOffset, byteLength),
     };
   });
-  const comparison = compareParts(parts, layout?.attributes);
+  const comparison = compareOutputs(parts, layout?.attributes);
   const figure = `${comparison.where} differ by up to ${comparison.error.toPrecision(2)} of the largest on the GPU`;
   const faults = isDifferent(comparison) ? [differs(comparison.where, 'the numbers of the CPU', figure)] : [];
   return { cell: comparison.error === 0 ? 'the same on the GPU' : figure, faults };

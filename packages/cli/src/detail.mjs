@@ -6,14 +6,14 @@ import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } f
 import { dirname, join, resolve } from 'node:path';
 import { toDegree } from '@gaussian-splat/economise';
 import { readScene, upright } from '@gaussian-splat/formats';
-import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
+import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import {
   buildDetailTree,
-  codingOf,
+  codingFor,
   cutPages,
   findPageSteps,
   placesOnGrid,
-  USUAL_STEPS,
+  DEFAULT_STEPS,
   writePages,
 } from '@gaussian-splat/economise/pages';
 import { from, parseSceneOptions, runCommand, sayWarnings, UsageError } from './lib/command.mjs';
@@ -97,7 +97,7 @@ async function deviceToMeasure() {
     const { requestNodeAdapter } = await import('./lib/node-gpu.mjs');
     const adapter = await requestNodeAdapter({ isTrusted: true });
     const device = await adapter.requestDevice(deviceDescriptor(adapter));
-    await startVariants(device, { format: 'rgba8unorm' });
+    await pickInitialVariants(device, { format: 'rgba8unorm' });
     return device;
   } catch (error) {
     console.log(`not measured: ${error.message}`);
@@ -109,12 +109,12 @@ async function deviceToMeasure() {
 async function chooseCoding({ tree, cloud, minDecibels, scored }) {
   if (minDecibels === undefined) return undefined;
   const device = await deviceToMeasure();
-  if (device === undefined) return { coding: codingOf(USUAL_STEPS), deflate };
+  if (device === undefined) return { coding: codingFor(DEFAULT_STEPS), deflate };
   const { steps, ...found } = await findPageSteps({
     ...{ tree, pages: cutPages(tree), cloud, device, minDecibels, scored, deflate: deflateQuickly },
     onStep: (step) => console.log(`  ${step}`),
   });
-  return { coding: codingOf(steps), deflate, ...found };
+  return { coding: codingFor(steps), deflate, ...found };
 }
 
 /**
@@ -141,8 +141,8 @@ function writeFolder(out, tree, coded, places) {
 }
 
 async function main({ scene, out, degree, geometry, minDecibels, scored, columns, rows, spacing }) {
-  const openPart = (path) => readWhole(join(dirname(scene), path));
-  const read = await readScene(await readWhole(scene), { name: scene, openPart });
+  const openFile = (path) => readWhole(join(dirname(scene), path));
+  const read = await readScene(await readWhole(scene), { name: scene, openFile });
   sayWarnings(scene, read);
   // Pages cannot store another up direction.
   const cloud = upright(toDegree(degree, read));

@@ -125,11 +125,11 @@ function parseViews(path) {
 }
 
 /** Longest side of a view in px, as in training. Larger images take gigabytes, or exceed the GPU's limits. */
-const LARGEST_SIDE = 1600;
+const MAX_SIDE = 1600;
 
 /** Reduces the resolution of a view if it is too large. */
-function atMostLargest(camera) {
-  const share = LARGEST_SIDE / Math.max(camera.width, camera.height);
+function scaledToMaxSide(camera) {
+  const share = MAX_SIDE / Math.max(camera.width, camera.height);
   if (share >= 1) return camera;
   const [width, height] = [camera.width, camera.height].map((side) => Math.max(1, Math.round(share * side)));
   const [x, y] = [width / camera.width, height / camera.height];
@@ -141,9 +141,9 @@ function readViews(path) {
   if (path === undefined) return undefined;
   const views = parseViews(path);
   const cameras = views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`));
-  const drawn = cameras.map(atMostLargest);
+  const drawn = cameras.map(scaledToMaxSide);
   const smaller = drawn.filter((camera, k) => camera !== cameras[k]).length;
-  if (smaller > 0) console.log(`views        ${smaller} of ${views.length} in fewer pixels, ${LARGEST_SIDE} a side`);
+  if (smaller > 0) console.log(`views        ${smaller} of ${views.length} in fewer pixels, ${MAX_SIDE} a side`);
   const dealt = dealOwnViews(drawn);
   if (dealt.heldOut.length > 0) return { dealt, range: `of ${path} and between them` };
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
@@ -204,8 +204,8 @@ async function main({
   const say = (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`);
   const onScored = (done, all) => say(`scored in ${done} of ${all} views`);
   const measuring = await GpuEvaluator.create(device, cloud, views, { pool, onScored });
-  const mostError = 10 ** (-asked / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
-  const merging = { views: views.scored, mostError, pool };
+  const maxError = 10 ** (-asked / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
+  const merging = { views: views.scored, maxError, pool };
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;

@@ -102,8 +102,8 @@ async function floorOfVoxels(scene, up, options) {
 }
 
 async function floorOfScene(scene, up, options) {
-  const openPart = (part) => readWhole(join(dirname(scene), part));
-  const cloud = await readScene(await readWhole(scene), { name: basename(scene), openPart });
+  const openFile = (part) => readWhole(join(dirname(scene), part));
+  const cloud = await readScene(await readWhole(scene), { name: basename(scene), openFile });
   sayWarnings(basename(scene), cloud);
   return makeWalkMap(cloud, { ...options, frame: FRAMES[up ?? axisOf(cloud.hints?.up ?? [0, -1, 0])] });
 }

@@ -48,8 +48,8 @@ async function writeSingle() {
     );
   const title = titleOf(scene);
   const name = JSON.stringify(basename(scene)).replaceAll('<', '\\u003c');
-  const licences = readFileSync(join(CDN, 'LICENSES.txt'), 'utf8').replaceAll('--', '- -');
-  const script = `<!--\n${licences}-->
+  const licenses = readFileSync(join(CDN, 'LICENSES.txt'), 'utf8').replaceAll('--', '- -');
+  const script = `<!--\n${licenses}-->
   <script type="text/plain" id="scene">${readFileSync(scene).toString('base64')}</script>
   <script type="module">${readFileSync(ELEMENT, 'utf8').replaceAll(/<(?=\/script|!--)/gi, '\\x3c')}</script>
   <script type="module">

@@ -5,7 +5,7 @@
 import { existsSync, mkdirSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { framePath, parseSequence, readScene } from '@gaussian-splat/formats';
-import { deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
+import { deviceDescriptor, pickInitialVariants } from '@gaussian-splat/renderer';
 import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
 import { codeClip, codeSequence } from '@gaussian-splat/economise';
 import { deflate, deflateQuickly, encodeWebp } from './lib/encoders.mjs';
@@ -53,7 +53,7 @@ function parseOptions(args) {
 async function openDevice() {
   const adapter = await requestNodeAdapter({ isTrusted: true });
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
-  await startVariants(device, { format: 'rgba8unorm' });
+  await pickInitialVariants(device, { format: 'rgba8unorm' });
   return device;
 }
 
@@ -66,7 +66,7 @@ async function main({ manifest, out, isClip, minDecibels, maxMbps, framesPerFile
     const path = join(dirname(manifest), framePath(sequence, frame));
     const bytes = await readWhole(path);
     sourceBytes += bytes.length;
-    return readScene(bytes, { name: path, openPart: (part) => readWhole(join(dirname(path), part)) });
+    return readScene(bytes, { name: path, openFile: (part) => readWhole(join(dirname(path), part)) });
   };
   const options = {
     ...{ frameCount, framesPerSecond, openFrame, minDecibels, device: await openDevice() },

@@ -19,7 +19,7 @@ import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
 const USAGE = `usage: gaussian-splat video SCENE (--path VIEWS.json | --turntable) --out FOLDER|FILE.mp4|FILE.webm [options]
 
   --path FILE          what the attribute "views" of the element takes: a list of views, a cameras.json, or the
-                       settings of SuperSplat, whose keyframes count. The path is that of flyAlong()
+                       settings of SuperSplat, whose keyframes count. The path is that of flyPath()
   --turntable          one turn around the target instead
   --out PATH           a folder for frame-0000.png, frame-0001.png ... with straight alpha; or a video, for which
                        ffmpeg must be installed: .webm keeps the alpha, .mp4 has none
@@ -35,9 +35,9 @@ const USAGE = `usage: gaussian-splat video SCENE (--path VIEWS.json | --turntabl
 `;
 
 /** Frames of one video. */
-const MOST_FRAMES = 100_000;
+const MAX_FRAMES = 100_000;
 /** Pixels of a side. */
-const MOST_PIXELS = 16_384;
+const MAX_PIXELS = 16_384;
 
 function parseOptions(args) {
   const text = { type: 'string' };
@@ -65,8 +65,8 @@ function parseOptions(args) {
     drawing,
     ...{ width, height },
     frameRate: readNumber('--fps', values.fps, 0.01, 1000),
-    seconds: readNumber('--seconds', values.seconds, 0, MOST_FRAMES),
-    frames: readNumber('--frames', values.frames, 1, MOST_FRAMES, true),
+    seconds: readNumber('--seconds', values.seconds, 0, MAX_FRAMES),
+    frames: readNumber('--frames', values.frames, 1, MAX_FRAMES, true),
     attributes: attributesOf(values),
   };
 }
@@ -78,18 +78,16 @@ function attributesOf({ orbit, target, 'field-of-view': fieldOfView, up, orthogr
 
 function readSize(text) {
   const sides = /^(\d+)x(\d+)$/.exec(text)?.slice(1).map(Number);
-  if (!sides?.every((side) => side >= 1 && side <= MOST_PIXELS))
-    throw new UsageError(`--size: expected two sides of 1 to ${MOST_PIXELS} pixels such as 1280x720, found "${text}"`);
+  if (!sides?.every((side) => side >= 1 && side <= MAX_PIXELS))
+    throw new UsageError(`--size: expected two sides of 1 to ${MAX_PIXELS} pixels such as 1280x720, found "${text}"`);
   return sides;
 }
 
-function readNumber(name, text, least, most, isWhole = false) {
+function readNumber(name, text, min, max, isWhole = false) {
   if (text === undefined) return undefined;
   const value = Number(text);
-  if (text.trim() === '' || !(value >= least && value <= most) || (isWhole && !Number.isInteger(value)))
-    throw new UsageError(
-      `${name}: expected a ${isWhole ? 'whole ' : ''}number from ${least} to ${most}, found "${text}"`,
-    );
+  if (text.trim() === '' || !(value >= min && value <= max) || (isWhole && !Number.isInteger(value)))
+    throw new UsageError(`${name}: expected a ${isWhole ? 'whole ' : ''}number from ${min} to ${max}, found "${text}"`);
   return value;
 }
 
@@ -139,8 +137,8 @@ async function video(options) {
   sayWarnings(options.scene, cloud);
   const { width, height, frameRate } = options;
   const cameras = camerasAlong({ ...options, views, bounds: { ...boundsOf(cloud), up: cloud.hints?.up } });
-  if (cameras.length > MOST_FRAMES)
-    throw new UsageError(`--seconds: expected at most ${MOST_FRAMES} frames, found ${cameras.length}`);
+  if (cameras.length > MAX_FRAMES)
+    throw new UsageError(`--seconds: expected at most ${MAX_FRAMES} frames, found ${cameras.length}`);
   const renderer = await openSceneRenderer(cloud, options.drawing);
   const target = resolve(from, options.out);
   const open = isVideo(target) ? openVideo : openFolder;

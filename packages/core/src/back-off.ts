@@ -4,7 +4,7 @@ export interface BackOffOptions {
   /** Growth factor of the pauses. */
   readonly factor: number;
   /** Number of consecutive failures after which no more attempts follow. */
-  readonly mostTries: number;
+  readonly maxTries: number;
   /** Milliseconds from any origin. Default: `performance.now`. */
   readonly now?: (() => number) | undefined;
 }
@@ -20,9 +20,9 @@ export class BackOff<K> {
 
   /** @returns Number of consecutive failures. */
   fail(key: K): number {
-    const { firstMs, factor, mostTries } = this.#options;
+    const { firstMs, factor, maxTries } = this.#options;
     const times = (this.#failures.get(key)?.times ?? 0) + 1;
-    const pause = times < mostTries ? firstMs * factor ** (times - 1) : Infinity;
+    const pause = times < maxTries ? firstMs * factor ** (times - 1) : Infinity;
     this.#failures.set(key, { times, until: this.#now() + pause, isTaken: false });
     return times;
   }

@@ -66,14 +66,14 @@ function boxOf(positions: Float32Array): [number[], number[]] {
     [-Infinity, -Infinity, -Infinity],
   ];
   for (let axis = 0; axis < 3; axis++) {
-    let least = Infinity;
-    let most = -Infinity;
+    let lowest = Infinity;
+    let highest = -Infinity;
     for (let i = axis; i < positions.length; i += 3) {
       const place = positions[i];
-      if (place < least) least = place;
-      if (place > most) most = place;
+      if (place < lowest) lowest = place;
+      if (place > highest) highest = place;
     }
-    [min[axis], max[axis]] = [least, most];
+    [min[axis], max[axis]] = [lowest, highest];
   }
   return [min, max];
 }
@@ -81,13 +81,13 @@ function boxOf(positions: Float32Array): [number[], number[]] {
 /** A sphere around the center of the points' box. */
 function ballAround(places: readonly Float32Array[]): { center: number[]; radius: number } {
   const center = [0, 1, 2].map((axis) => {
-    const [least, most] = places.reduce(
-      ([least, most], place) => [Math.min(least, place[axis]), Math.max(most, place[axis])],
+    const [min, max] = places.reduce(
+      ([min, max], place) => [Math.min(min, place[axis]), Math.max(max, place[axis])],
       [Infinity, -Infinity],
     );
-    return (least + most) / 2;
+    return (min + max) / 2;
   });
-  return { center, radius: places.reduce((most, place) => Math.max(most, distance(place, center)), 0) };
+  return { center, radius: places.reduce((max, place) => Math.max(max, distance(place, center)), 0) };
 }
 
 /** Evenly spaced splats of opacity 0.1 or more; all splats if none is that opaque. */

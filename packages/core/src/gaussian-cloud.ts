@@ -199,7 +199,7 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
       opacities[kept] = opacities[i];
       sh.copyWithin(shLength * kept, shLength * i, shLength * (i + 1));
     }
-    normaliseQuaternion(rotations, 4 * kept);
+    normalizeQuaternion(rotations, 4 * kept);
     opacities[kept] = Math.min(1, Math.max(0, opacities[kept]));
     kept++;
   }
@@ -225,7 +225,7 @@ function faultOf({ scales, rotations }: GaussianCloud, i: number): number {
   return Math.max(...axes) < MIN_LONGEST_SCALE ? 2 : 3;
 }
 
-function normaliseQuaternion(rotations: Float32Array, at: number): void {
+function normalizeQuaternion(rotations: Float32Array, at: number): void {
   const scale = 1 / Math.sqrt(squaredNorm(rotations, at));
   for (let k = at; k < at + 4; k++) rotations[k] *= scale;
 }

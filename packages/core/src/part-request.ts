@@ -32,7 +32,7 @@ export interface PartRequest {
  * @throws GaussianSplatError `decode/unsupported` for other servers, and for relative paths in a manifest without a
  * base address (`blob:`, `data:`).
  */
-export function partRequest(path: string, manifest: PartRequest, origins: readonly string[] = []): PartRequest {
+export function fileRequest(path: string, manifest: PartRequest, origins: readonly string[] = []): PartRequest {
   const { url: parent, credentials } = manifest;
   const url = URL.canParse(path, parent) ? partUrl(path, parent) : undefined;
   if (url && serverOf(url) === serverOf(new URL(parent))) return { url: url.href, credentials };

@@ -15,7 +15,7 @@ export interface ProjectionOptions {
  * Near plane as a fraction of the distance between the planes, for parallel rays whose near plane is at the eye or
  * behind it.
  */
-const LEAST_NEAR = 1e-3;
+const MIN_NEAR = 1e-3;
 
 /**
  * Returns a camera for the two matrices of a host such as three.js, glMatrix or WebXR: x right, y up, z backward, clip
@@ -51,7 +51,7 @@ export function cameraFromProjection(
   // An infinite far plane divides by zero, or nearly.
   const distances = planes.map((plane) => (Number.isFinite(plane) && (orthographic || plane > 0) ? plane : Infinity));
   const [nearest, far] = [Math.min(...distances), Math.max(...distances)];
-  const back = orthographic && nearest <= 0 ? LEAST_NEAR * (far - nearest) - nearest : 0;
+  const back = orthographic && nearest <= 0 ? MIN_NEAR * (far - nearest) - nearest : 0;
   const flip = [1, -1, -1, 1];
   const worldToCamera = Float64Array.from(
     { length: 16 },

@@ -78,7 +78,7 @@ const MAX_TRIES = 8;
  * Maximum number of enlargements of the cut, the fraction of the remaining error that each uses, and the fraction of
  * the allowed error that ends them.
  */
-const [MOST_MORE, MORE_SHARE, ENOUGH] = [3, 0.9, 0.98];
+const [MAX_EXTRA, MORE_SHARE, ENOUGH] = [3, 0.9, 0.98];
 const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
@@ -127,7 +127,7 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   };
   let found = await write(ready ?? (await cutCloud(plan, evaluator, budget, signal)));
   for (let tries = 2; found.error > target; tries++) {
-    if (plan === WHOLE) throw unreachable(options, atMost(found.error));
+    if (plan === WHOLE) throw unreachable(options, upperBound(found.error));
     const isLast = tries >= MAX_TRIES || plan.filling === 0;
     plan = isLast ? WHOLE : { ...plan, filling: SHRINK ** (tries - 1) * plan.filling };
     found = await write(await cutCloud(plan, evaluator, budget, signal));
@@ -175,7 +175,7 @@ interface Written extends CutCloud {
  */
 async function takeMore(found: Written, target: number, take: (extra: number) => Promise<Written>): Promise<Written> {
   let [best, low, high] = [found, 0, Infinity];
-  for (let tries = 0; tries < MOST_MORE && best.error < ENOUGH * target; tries++) {
+  for (let tries = 0; tries < MAX_EXTRA && best.error < ENOUGH * target; tries++) {
     const next = Math.min(low + MORE_SHARE * (target - best.error), (low + high) / 2);
     const other = await take(next);
     if (other.error > target || other.bytes.length >= best.bytes.length) high = next;
@@ -216,7 +216,7 @@ async function chooseEncoding(
     const isLast = encoding === encodings[encodings.length - 1];
     if (rounding <= ROUNDING_SHARE * target || (isLast && rounding < 0.95 * target)) return { encoding, rounding };
   }
-  throw unreachable(options, atMost(best));
+  throw unreachable(options, upperBound(best));
 }
 
 /** Copies shared memory, because many APIs reject shared buffers. */
@@ -244,7 +244,7 @@ function summary(
   };
 }
 
-const atMost = (error: number): string => `at most ${decibels(error).toFixed(1)} dB, with every splat kept`;
+const upperBound = (error: number): string => `at most ${decibels(error).toFixed(1)} dB, with every splat kept`;
 
 function unreachable({ name, minDecibels }: EconomiseOptions, found: string): GaussianSplatError {
   return new GaussianSplatError('argument/value', {

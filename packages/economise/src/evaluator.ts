@@ -1,5 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { SeenSplats } from './pages/seen-splats.js';
+import type { SplatVisibility } from './pages/seen-splats.js';
 import type { Cut, ReducedCloud } from './reduce.js';
 import type { Ranking } from './score.js';
 
@@ -7,7 +7,7 @@ import type { Ranking } from './score.js';
  * Views for measuring errors: those of the search, or the held-out ones, which measure the result and whether its cut
  * is too large.
  */
-export type JudgedViews = 'searched' | 'heldOut';
+export type EvaluationViews = 'searched' | 'heldOut';
 
 /** Statistics and errors of a cut scene. */
 export interface CutFigures {
@@ -28,15 +28,15 @@ export interface Evaluator {
   /** Scores the scene in the scoring views. Must be called first; it draws the scene once. */
   rank(signal?: AbortSignal): Promise<Ranking>;
   /** Visibility of the splats in the scoring views, if the evaluator provides it; call {@link rank} first. */
-  seen?(): Promise<SeenSplats | undefined>;
+  seen?(): Promise<SplatVisibility | undefined>;
   /** Measures a cut in images of the scene. */
-  cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures>;
+  cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures>;
   /** Applies a cut, for writing. */
   reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud>;
   /** Errors of another cloud that replaces the scene, as {@link CutFigures.errors}. */
-  compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
+  compare(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]>;
   /** The same at the speed of {@link cut}: accurate enough for a search. */
-  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
+  sketch(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]>;
   /**
    * Fits a cut scene to images of the whole one, if the evaluator supports it ({@link RefiningEvaluator}). The argument
    * is not modified.

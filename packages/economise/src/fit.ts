@@ -73,13 +73,13 @@ export async function findTrades(
   const dropping = await chooseDropping(ranking, evaluator, signal);
   const drop = await along(dropping.thresholds, dropping.cutAt, left);
   onStep('measuring what fewer bands of colour cost');
-  const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }), 1, hasOneDegree);
+  const color = await along(cloud.shDegree > 0 ? PRICES : [], (colorPrice) => ({ colorPrice }), 1, hasOneDegree);
   const trades: Trades = {
     cutAt: (error) => {
-      const [dropped, coloured] = bestTrades(drop, colour, error);
+      const [dropped, colored] = bestTrades(drop, color, error);
       // The GPU compares in float32.
-      const [threshold, colourPrice] = [Math.fround(dropped.threshold), Math.fround(coloured.threshold)];
-      return { ...dropping.cutAt(threshold), colourPrice };
+      const [threshold, colorPrice] = [Math.fround(dropped.threshold), Math.fround(colored.threshold)];
+      return { ...dropping.cutAt(threshold), colorPrice };
     },
   };
   const { mergePrices } = evaluator;
@@ -91,7 +91,7 @@ export async function findTrades(
     const figures = await evaluator.cut(cut, 'searched', signal);
     const error = errorTogether(figures.errors, 'searched');
     if (left === 1) return { error, saved: saved(figures) };
-    const { errors } = await evaluator.cut({ ...cut, colourPrice: 0 }, 'searched', signal);
+    const { errors } = await evaluator.cut({ ...cut, colorPrice: 0 }, 'searched', signal);
     return { error: error - (1 - left) * Math.min(error, errorTogether(errors, 'searched')), saved: saved(figures) };
   };
   return tradeMerges(trades, merge, budget, measure);
@@ -130,7 +130,7 @@ async function chooseDropping(
     const places = [TRIAL_SHARE, ...DROPPED_SHARES].map((share) => Math.floor(share * (values.length - 1)));
     const [trial, ...dropped] = valuesAtPlaces(values, places);
     // Splats without any cost are dropped first, for any budget.
-    return { trial, dropped: [leastAboveZero(values), ...dropped], cutAt };
+    return { trial, dropped: [smallestAboveZero(values), ...dropped], cutAt };
   });
   const trials: number[] = [];
   for (const { trial, cutAt } of candidates)
@@ -141,12 +141,12 @@ async function chooseDropping(
 }
 
 /** GPUs may flush smaller numbers to 0. */
-const LEAST_NORMAL = 2 ** -126;
+const MIN_NORMAL = 2 ** -126;
 
-function leastAboveZero(values: Float32Array): number {
-  let least = Infinity;
-  for (let i = 0; i < values.length; i++) if (values[i] >= LEAST_NORMAL && values[i] < least) least = values[i];
-  return least;
+function smallestAboveZero(values: Float32Array): number {
+  let min = Infinity;
+  for (let i = 0; i < values.length; i++) if (values[i] >= MIN_NORMAL && values[i] < min) min = values[i];
+  return min;
 }
 
 /**

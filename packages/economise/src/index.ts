@@ -1,23 +1,23 @@
 export { economiseWithin, FIRST_DECIBELS, type EconomisedWithin } from './within-bytes.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
-export type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
+export type { CutFigures, Evaluator, EvaluationViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
 export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, type Image } from './measure.js';
 export type { TaskPool } from './parts/task-pool.js';
 export { degreesOf, reduce, splatsOf, toDegree, type Cut, type ReducedCloud } from './reduce.js';
 export { RefiningEvaluator, type RefiningOptions } from './refine/refining-evaluator.js';
-export type { Descent } from './refine/scene-fitter.js';
-export type { LoweredColours, Ranking, Scores } from './score.js';
+export type { OptimizerOptions } from './refine/scene-fitter.js';
+export type { ReducedSh, Ranking, Scores } from './score.js';
 export {
   dealOwnViews,
-  dealtViewsAround,
+  viewSplitAround,
   dealtViewsOfVisitors,
-  dealViews,
+  splitViews,
   viewsAround,
   viewsBetween,
   type DealtViewOptions,
-  type DealtViews,
+  type ViewSplit,
   type ViewOptions,
 } from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';
@@ -26,6 +26,6 @@ export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './wri
 export { isLodIndex, writeStreamedSog } from './write/streamed-sog.js';
 export { filesOfZip } from './write/zip.js';
 export { codeSequence, type CodedSequence, type CodeSequenceOptions } from './motion/code-sequence.js';
-export { withNearAxes } from './motion/near-axes.js';
+export { alignAxes } from './motion/near-axes.js';
 export { writeMotion, type MotionOptions, type MotionSteps } from './motion/write-motion.js';
 export { codeClip, type CodeClipOptions, type CodedClip } from './clip/code-clip.js';

@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { JudgedViews } from './evaluator.js';
+import type { EvaluationViews } from './evaluator.js';
 
 /** An image, [height, width, 4] premultiplied red, green, blue and alpha in float32. */
 export type Image = Float32Array;
@@ -28,7 +28,7 @@ export const mean = (values: readonly number[]): number =>
  * @param errors Errors of the views that show the scene.
  * @throws GaussianSplatError `argument/value` if there are none, because a cut could not be evaluated.
  */
-export function errorTogether(errors: readonly number[], views: JudgedViews): number {
+export function errorTogether(errors: readonly number[], views: EvaluationViews): number {
   if (errors.length > 0) return mean(errors);
   throw new GaussianSplatError('argument/value', {
     where: views === 'heldOut' ? 'held-out views' : 'searched views',

@@ -13,7 +13,7 @@ export interface Cut {
   /** Drops splats whose removal costs less than this mean squared error; 0, the default, keeps all. */
   readonly removalPrice?: number;
   /** Mean squared error that a coefficient is worth: those that save less are dropped; 0, the default, keeps all. */
-  readonly colourPrice?: number;
+  readonly colorPrice?: number;
   /**
    * Merges pairs of similar splats up to this mean squared error, if the evaluator supports it ({@link
    * MergingEvaluator}); 0, the default, merges none.
@@ -58,7 +58,7 @@ export function writtenOrder(
 /** Applies a cut. The source is not modified. */
 export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedCloud {
   const { contribution, removalError, lowered } = scores;
-  const { minContribution = 0, removalPrice = 0, colourPrice = 0 } = cut;
+  const { minContribution = 0, removalPrice = 0, colorPrice = 0 } = cut;
   const staying = new Uint32Array(cloud.count);
   let count = 0;
   for (let i = 0; i < cloud.count; i++) {
@@ -66,7 +66,7 @@ export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedC
     staying[count++] = i;
   }
   const kept = writtenOrder(cloud, contribution, staying.subarray(0, count));
-  const degrees = Uint8Array.from(kept, (i) => degreeOf(cloud.shDegree, scores, i, colourPrice));
+  const degrees = Uint8Array.from(kept, (i) => degreeOf(cloud.shDegree, scores, i, colorPrice));
   const reduced = reduceTo(cloud, { kept, degrees });
   const length = 3 * shCoefficientCount(reduced.cloud.shDegree);
   for (let k = 0; k < kept.length; k++) {
@@ -121,11 +121,11 @@ function roomFor(cloud: GaussianCloud, { kept, degrees }: Choice, pool: TaskPool
 /** The degree that minimizes the error plus the price of the kept coefficients. */
 function degreeOf(full: ShDegree, { lowered }: Scores, i: number, price: number): ShDegree {
   let best = full;
-  let least = price * shCoefficientCount(full);
+  let min = price * shCoefficientCount(full);
   for (let degree = 0; degree < full; degree++) {
     const cost = lowered[degree].error[i] + price * shCoefficientCount(degree as ShDegree);
-    if (cost > least || (cost === least && price === 0)) continue;
-    [best, least] = [degree as ShDegree, cost];
+    if (cost > min || (cost === min && price === 0)) continue;
+    [best, min] = [degree as ShDegree, cost];
   }
   return price > 0 ? best : full;
 }

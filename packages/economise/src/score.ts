@@ -10,7 +10,7 @@ export interface Ranking {
 }
 
 /** Colors of all splats at a lower degree. */
-export interface LoweredColours {
+export interface ReducedSh {
   /**
    * [N] mean squared error of the views' images from this change of a single splat; Infinity for splats that too few
    * views contain.
@@ -23,7 +23,7 @@ export interface LoweredColours {
 /** A ranking, and the colors with fewer bands. */
 export interface Scores extends Ranking {
   /** The colors at each degree below the cloud's. */
-  readonly lowered: readonly LoweredColours[];
+  readonly lowered: readonly ReducedSh[];
 }
 
 /**

@@ -25,8 +25,8 @@ export class TradeCurve {
   constructor(trades: readonly Trade[], isStepped = false) {
     this.#isStepped = isStepped;
     // Noise must not make a larger saving cheaper.
-    let most = 0;
-    this.#trades = [NOTHING, ...trades.map((trade) => ({ ...trade, error: (most = Math.max(most, trade.error)) }))];
+    let max = 0;
+    this.#trades = [NOTHING, ...trades.map((trade) => ({ ...trade, error: (max = Math.max(max, trade.error)) }))];
   }
 
   /** The largest saving within an error. */
@@ -53,13 +53,13 @@ export function bestTrades(a: TradeCurve, b: TradeCurve, error: number): readonl
 export async function measureTrades(
   thresholds: readonly number[],
   measure: (threshold: number) => Promise<Trade>,
-  mostError: number,
+  maxError: number,
   isStepped = false,
 ): Promise<TradeCurve> {
   const trades: Trade[] = [];
   for (const threshold of thresholds) {
     trades.push(await measure(threshold));
-    if (trades[trades.length - 1].error > mostError) break;
+    if (trades[trades.length - 1].error > maxError) break;
   }
   return new TradeCurve(trades, isStepped);
 }

@@ -15,7 +15,7 @@ export interface AllocateOptions<K extends string> {
 /** Maximum ratio between a step and the usual one. */
 const FARTHEST = 8;
 /** Minimum fraction of the error of an attribute. */
-const LEAST_SHARE = 1e-3;
+const MIN_SHARE = 1e-3;
 
 /**
  * Finds steps such that an additional bit saves the same error in every attribute: the error of an attribute grows with
@@ -30,7 +30,7 @@ export async function allocateSteps<K extends string>(options: AllocateOptions<K
   const steps: Record<K, number> = { ...usual };
   for (const [name, count] of counts) {
     const doubled = await measure({ ...usual, [name]: 2 * usual[name] });
-    const own = Math.max((doubled - begun) / 3, LEAST_SHARE * begun);
+    const own = Math.max((doubled - begun) / 3, MIN_SHARE * begun);
     const factor = Math.sqrt((count * target) / (all * own));
     steps[name] *= Math.min(FARTHEST, Math.max(1 / FARTHEST, factor));
   }
@@ -112,7 +112,7 @@ const FARTHEST_SCALE = 3;
  * Lower limit of the exponent of the error as a function of the scale, which is usually 2, but may be lower between two
  * tries.
  */
-const LEAST_SLOPE = 0.5;
+const MIN_SLOPE = 0.5;
 
 /** A scale between tries above and below the target, or beyond those that are all on one side of it. */
 function nextScale(tried: readonly Tried[], aim: number): number {
@@ -127,7 +127,7 @@ function nextScale(tried: readonly Tried[], aim: number): number {
     const [before, last] = tried.slice(-2);
     const { scale, error } = last ?? before;
     const slope = last ? Math.log(error / before.error) / Math.log(scale / before.scale) : 2;
-    const factor = (aim / error) ** (1 / Math.min(2, Math.max(LEAST_SLOPE, slope || 2)));
+    const factor = (aim / error) ** (1 / Math.min(2, Math.max(MIN_SLOPE, slope || 2)));
     return scale * Math.min(FARTHEST_SCALE, Math.max(1 / FARTHEST_SCALE, factor));
   }
   const share = Math.log(aim / below.error) / Math.log(above.error / below.error);

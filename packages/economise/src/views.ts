@@ -130,7 +130,7 @@ export function excerptsOf(views: readonly Camera[]): Camera[] {
 }
 
 /** Views divided by purpose. */
-export interface DealtViews {
+export interface ViewSplit {
   /** Views for scoring the contribution of splats. */
   readonly scored: readonly Camera[];
   /** Views for finding the size of the cut. */
@@ -164,7 +164,7 @@ export function viewsBetween(views: readonly Camera[], all: readonly Camera[] = 
 }
 
 /** Mean axes that are shorter, or nearly parallel, define no orientation. */
-const LEAST_AXIS = 1e-3;
+const MIN_AXIS = 1e-3;
 
 /** A pose between two: the eye in the middle, the axes averaged and orthogonalized; undefined if they are degenerate. */
 function halfway(a: Camera, b: Camera): Camera['worldToCamera'] | undefined {
@@ -173,13 +173,13 @@ function halfway(a: Camera, b: Camera): Camera['worldToCamera'] | undefined {
   const axis = (row: number): Vector3 =>
     [0, 1, 2].map((k) => a.worldToCamera[4 * row + k] + b.worldToCamera[4 * row + k]) as [number, number, number];
   const [down, forward] = [axis(1), axis(2)];
-  if (Math.hypot(...cross(down, forward)) < LEAST_AXIS) return undefined;
+  if (Math.hypot(...cross(down, forward)) < MIN_AXIS) return undefined;
   const target = eye.map((value, k) => value + forward[k]) as [number, number, number];
   return lookAt(eye, target, [-down[0], -down[1], -down[2]]);
 }
 
 /** Divides views: of ten consecutive ones, one is for the search, two are held out, and the rest are for scoring. */
-export function dealViews(views: readonly Camera[]): DealtViews {
+export function splitViews(views: readonly Camera[]): ViewSplit {
   const of = (...places: number[]): Camera[] => views.filter((_, k) => places.includes(k % 10));
   return { scored: of(0, 1, 3, 4, 5, 6, 8), searched: of(2), heldOut: of(7, 9) };
 }
@@ -199,7 +199,7 @@ const [SEARCHED_SEED, HELD_OUT_SEED, SCORED_SEED] = [1, 2, 10];
 const HELD_OUT = 24;
 
 /** Views around a subject, all of one size: 216 for scoring, 8 for the search, 24 held out. */
-export function dealtViewsAround(bounds: Bounds, { scored = 216, ...options }: DealtViewOptions = {}): DealtViews {
+export function viewSplitAround(bounds: Bounds, { scored = 216, ...options }: DealtViewOptions = {}): ViewSplit {
   return dealt(scored, (count, seed) => viewsAround(bounds, count, { ...options, seed }));
 }
 
@@ -208,35 +208,35 @@ export function dealtViewsAround(bounds: Bounds, { scored = 216, ...options }: D
  * it. Errors are measured in crops of frames of 1920 x 1080.
  * @param scored Number of scoring views.
  */
-export function dealtViewsOfVisitors(bounds: Bounds, scored = 216): DealtViews {
+export function dealtViewsOfVisitors(bounds: Bounds, scored = 216): ViewSplit {
   const { searched, heldOut, ...rest } = dealt(scored, (count, seed) => viewsOfVisitors(bounds, count, { seed }));
   return { ...rest, searched: excerptsOf(searched), heldOut: excerptsOf(heldOut) };
 }
 
-const dealt = (scored: number, viewsOf: (count: number, seed: number) => Camera[]): DealtViews => ({
+const dealt = (scored: number, viewsOf: (count: number, seed: number) => Camera[]): ViewSplit => ({
   scored: viewsOf(scored, SCORED_SEED),
   searched: viewsOf(8, SEARCHED_SEED),
   heldOut: viewsOf(HELD_OUT, HELD_OUT_SEED),
 });
 
 /** Minimum pixels of scoring views, because most splats are smaller than a pixel in smaller views, and seem unneeded. */
-const LEAST_SCORED_PIXELS = 480 * 270;
+const MIN_SCORED_PIXELS = 480 * 270;
 
 /**
  * Divides a scene's own views ({@link splitViews}). Views between neighbors are added for scoring and for measuring
  * errors, in crops of frames at the resolution of visitors' screens.
  */
-export function dealOwnViews(views: readonly Camera[]): DealtViews {
-  const { scored, searched, heldOut } = dealViews(views);
+export function dealOwnViews(views: readonly Camera[]): ViewSplit {
+  const { scored, searched, heldOut } = splitViews(views);
   const judged = (own: readonly Camera[]): Camera[] => excerptsOf([...own, ...viewsBetween(own, views)]);
   return {
-    scored: [...scored, ...viewsBetween(scored)].map((view) => atLeast(view, LEAST_SCORED_PIXELS)),
+    scored: [...scored, ...viewsBetween(scored)].map((view) => lowerBound(view, MIN_SCORED_PIXELS)),
     searched: judged(searched),
     heldOut: judged(heldOut),
   };
 }
 
-function atLeast(view: Camera, pixels: number): Camera {
+function lowerBound(view: Camera, pixels: number): Camera {
   const share = Math.sqrt(pixels / (view.width * view.height));
   if (share <= 1) return view;
   const [width, height] = [view.width, view.height].map((side) => Math.round(share * side));

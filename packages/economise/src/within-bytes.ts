@@ -8,7 +8,7 @@ export interface EconomisedWithin extends Economised {
 
 /** Initial PSNR of the search, dB. */
 export const FIRST_DECIBELS = 45;
-const LEAST_DECIBELS = 15;
+const MIN_PSNR = 15;
 const DECIBELS_STEP = 6;
 const MAX_TRIES = 7;
 /** The search ends at this fraction of the bytes. */
@@ -26,7 +26,7 @@ export async function economiseWithin(
   let [low, high] = [-Infinity, Infinity];
   let best: EconomisedWithin | undefined;
   let minDecibels = FIRST_DECIBELS;
-  for (let tries = 0; tries < MAX_TRIES && minDecibels >= LEAST_DECIBELS; tries++) {
+  for (let tries = 0; tries < MAX_TRIES && minDecibels >= MIN_PSNR; tries++) {
     const found = await economise(cloud, { ...options, minDecibels }).catch(undefinedIfBeyondFormat);
     const outcome = found ? `${found.bytes.length} bytes` : 'beyond the format';
     options.onStep?.(`${minDecibels.toFixed(1)} dB: ${outcome}`);
@@ -41,7 +41,7 @@ export async function economiseWithin(
   if (best) return best;
   throw new GaussianSplatError('argument/value', {
     where: options.name,
-    expected: `a size that has room for the scene at ${LEAST_DECIBELS} dB`,
+    expected: `a size that has room for the scene at ${MIN_PSNR} dB`,
     found: `${(maxBytes / 1e6).toFixed(2)} MB`,
     remedy: 'allow more bytes, or choose .sog, the smallest format',
   });

@@ -19,7 +19,7 @@ import {
 } from './camera/grammar.js';
 import type { CameraSettings } from './camera/settings.js';
 import type { Numbers } from './dynamic/values.js';
-import type { SpokenStrings } from './words.js';
+import type { A11yStrings } from './words.js';
 
 /** Limits a delay in ms to the maximum of timers, which treat longer ones, even `Infinity`, as 0. */
 export const timerMs = (wait: number): number => Math.min(wait, 2 ** 31 - 1);
@@ -97,15 +97,15 @@ const map = <A, B>(grammar: AttributeGrammar<A>, to: (value: A) => B): Attribute
 const milliseconds = (fallback: number): AttributeGrammar<number> =>
   map(numberGrammar(fallback, 0, 'milliseconds, 0 or more'), timerMs);
 /** The renderer's own limit. */
-const MOST_DETAIL_PIXELS = 64;
+const MAX_DETAIL_PIXELS = 64;
 const detailGrammar: AttributeGrammar<DetailChoice> = {
-  expected: `auto, off, or at most ${MOST_DETAIL_PIXELS} pixels such as 1px`,
+  expected: `auto, off, or at most ${MAX_DETAIL_PIXELS} pixels such as 1px`,
   fallback: 'auto',
   parse: (written) => {
     const word = written.trim().toLowerCase();
     if (word === 'auto' || word === 'off') return word;
     const pixels = /^(\d+(\.\d*)?|\.\d+)px$/.test(word) ? parseFloat(word) : NaN;
-    return pixels <= MOST_DETAIL_PIXELS ? pixels : null;
+    return pixels <= MAX_DETAIL_PIXELS ? pixels : null;
   },
 };
 
@@ -391,7 +391,7 @@ export const ATTRIBUTES = {
    * @default by `lang`
    * @example a11y='{ "pause": "Anhalten", "play": "Abspielen" }'
    */
-  a11y: text<SpokenStrings | string | null>(),
+  a11y: text<A11yStrings | string | null>(),
   /**
    * Up direction in the axes of the file: `x`, `-x`, `y`, `-y` (as in training), `z`, `-z`, or a vector such as `0.1 -1
    * 0.2` for a tilted capture. The playground finds it from three points of the floor. The contract of a generator may

@@ -3,7 +3,7 @@ import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
 import { viewName, type ViewName } from './camera/spoken.js';
-import type { SpokenStrings } from './words.js';
+import type { A11yStrings } from './words.js';
 import type { AnnouncerController, AnnouncerHost } from './controllers/announcer-controller.js';
 import type { AutoRotateHost } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
@@ -14,11 +14,11 @@ import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/m
 import type { PromptController, PromptHost } from './controllers/prompt-controller.js';
 
 /** Interface of the element for behaviors. */
-export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
+export interface BehaviorHost extends Omit<MotionHost, 'startTurning'> {
   readonly attributes: Attributes;
   readonly camera: CameraController;
   readonly input: InputOptions;
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   readonly surface: HTMLElement | null;
   /** The walk controller, once it is loaded. */
   readonly walk: { readonly value: { readonly isRefused: boolean; ahead(meters: number): void } | undefined };
@@ -27,10 +27,10 @@ export interface BehaviourHost extends Omit<MotionHost, 'startTurning'> {
 }
 
 /** Camera behaviors besides direct input: auto-rotation, prompt, flying, announcements. */
-export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, AnnouncerHost, MotionHost {
+export class Behaviors implements AutoRotateHost, PromptHost, FlyHost, AnnouncerHost, MotionHost {
   /** Created with the camera controls. */
   prompt: PromptController | undefined;
-  readonly #host: BehaviourHost;
+  readonly #host: BehaviorHost;
   readonly #element: ReactiveControllerHost;
   readonly #movers: Mover[] = [];
 
@@ -49,7 +49,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.#added(new FlyController(this.#element, this));
   });
 
-  constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviourHost) {
+  constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviorHost) {
     this.#host = host;
     this.#element = element;
     this.motion = new Lazy(
@@ -98,7 +98,7 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.#host.surface;
   }
 
-  get strings(): SpokenStrings {
+  get strings(): A11yStrings {
     return this.#host.strings;
   }
 

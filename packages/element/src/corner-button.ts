@@ -1,6 +1,6 @@
 /** A button in a corner of the frame. Loaded on demand. */
 import { css, html, nothing, type TemplateResult } from 'lit';
-import { languageOf, type SpokenStrings } from './words.js';
+import { languageOf, type A11yStrings } from './words.js';
 
 export const CORNER_STYLES = css`
   .corner {
@@ -25,7 +25,7 @@ export const cornerButton = (
   label: string,
   sign: string,
   onClick: () => void,
-  strings: SpokenStrings,
+  strings: A11yStrings,
 ): TemplateResult =>
   html`<button
     type="button"

@@ -3,7 +3,7 @@ import type { FrameTarget } from '@gaussian-splat/renderer';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer/tools';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
-import { Behaviours, type BehaviourHost } from './behaviours.js';
+import { Behaviors, type BehaviorHost } from './behaviours.js';
 import type { CameraAction } from './camera/gestures.js';
 import type { ViewerFrame } from './camera/orbit.js';
 import { frameOf } from './camera/settings.js';
@@ -36,21 +36,21 @@ import type { Services, ElementHost } from './element-host.js';
 import { statsOf, type SceneStats } from './stats.js';
 import type { TemplateModel } from './template.js';
 import type { TourHost } from './views/tour.js';
-import type { SpokenStrings } from './words.js';
+import type { A11yStrings } from './words.js';
 
 /**
  * Connects the source list, camera, size, visibility and input of an element behind its attributes and markup. It
  * implements the host interface of each controller.
  */
 export class ElementCore
-  implements SourceOwner, ViewHost, RevealHost, HotspotHost, InputHost, BehaviourHost, QueryHost, TourHost
+  implements SourceOwner, ViewHost, RevealHost, HotspotHost, InputHost, BehaviorHost, QueryHost, TourHost
 {
   readonly element: ReactiveControllerHost & HTMLElement;
   readonly camera: CameraController;
   /** The element's own source and those of its children. */
   readonly sources: SourceList;
   readonly reveal: RevealController;
-  readonly behaviours: Behaviours;
+  readonly behaviors: Behaviors;
   readonly size: SizeController;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   drawnFrom: Camera | undefined;
@@ -78,7 +78,7 @@ export class ElementCore
   readonly tour = new Lazy(
     'the code for views',
     async () => {
-      const [{ Tour }] = await Promise.all([import('./views/tour.js'), this.behaviours.announcer.get()]);
+      const [{ Tour }] = await Promise.all([import('./views/tour.js'), this.behaviors.announcer.get()]);
       return new Tour(this.element, this);
     },
     this.#update,
@@ -89,7 +89,7 @@ export class ElementCore
     async () => {
       const { WalkController } = await import('./walk/walk-controller.js');
       const walk = new WalkController(this.element, this);
-      this.behaviours.add(walk);
+      this.behaviors.add(walk);
       return walk;
     },
     this.#update,
@@ -136,8 +136,8 @@ export class ElementCore
     'the code for mouse, touch and keys',
     async () => {
       const { handsView, InputController, PromptController } = await import('./controllers/input-controller.js');
-      await this.behaviours.announcer.get();
-      this.behaviours.promptBy(new PromptController(this.element, this.behaviours));
+      await this.behaviors.announcer.get();
+      this.behaviors.promptBy(new PromptController(this.element, this.behaviors));
       this.handsView = handsView;
       return new InputController(this.element, this);
     },
@@ -159,7 +159,7 @@ export class ElementCore
     this.view = new ViewController(this);
     this.sources = new SourceList(this, new SourceEntry(this, this));
     this.reveal = new RevealController(element, this);
-    this.behaviours = new Behaviours(element, this);
+    this.behaviors = new Behaviors(element, this);
     const onPageVisibility = (): void => this.sources.suspend();
     element.addController({
       hostConnected: () => {
@@ -196,7 +196,7 @@ export class ElementCore
     return this.#host.dynamicValues;
   }
 
-  get strings(): SpokenStrings {
+  get strings(): A11yStrings {
     return this.#host.strings;
   }
 
@@ -254,8 +254,8 @@ export class ElementCore
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null if there is nothing to draw. */
-  drawNow(...picture: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
-    return this.sources.ownEntry.scene.isPreview ? null : this.view.drawNow(...picture);
+  drawNow(...image: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
+    return this.sources.ownEntry.scene.isPreview ? null : this.view.drawNow(...image);
   }
 
   /** Frames the scene again, as after loading; the scene of a generator is measured first. */
@@ -354,7 +354,7 @@ export class ElementCore
 
   /** Automatic motion is allowed. */
   get mayMove(): boolean {
-    return this.isOnShow && !prefersReducedMotion() && !this.behaviours.motion.value?.isHeld;
+    return this.isOnShow && !prefersReducedMotion() && !this.behaviors.motion.value?.isHeld;
   }
 
   /** A touch user has moved the camera and has no Home key. */
@@ -362,11 +362,11 @@ export class ElementCore
     return this.input.enabled && this.isOnShow && this.#hands.value?.isTouch === true && this.camera.isTouched;
   }
 
-  get hasPicture(): boolean {
-    return this.sources.hasPicture;
+  get hasImage(): boolean {
+    return this.sources.hasImage;
   }
 
-  get player(): BehaviourHost['player'] {
+  get player(): BehaviorHost['player'] {
     return this.effects.value?.playerWith(this.sources.player) ?? this.sources.player;
   }
 
@@ -424,7 +424,7 @@ export class ElementCore
   }
 
   beforeFrame(now: number): void {
-    this.behaviours.advance(now);
+    this.behaviors.advance(now);
   }
 
   advanceScene(camera: Camera, now: number): void {
@@ -438,7 +438,7 @@ export class ElementCore
   }
 
   cameraChanged(source: CameraChangeSource): void {
-    this.behaviours.announcer.value?.cameraMoved();
+    this.behaviors.announcer.value?.cameraMoved();
     this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
   }
 
@@ -487,7 +487,7 @@ export class ElementCore
   }
 
   act(action: CameraAction): boolean {
-    return this.behaviours.act(action);
+    return this.behaviors.act(action);
   }
 
   /** A pick beside the scene means that the visitor has lost it. */
@@ -496,13 +496,13 @@ export class ElementCore
     if (this.attributes.navigation === 'walk') return;
     this.positionFromPoint(clientX, clientY).then((point) => {
       if (point === null) this.act({ type: 'reset' });
-      else if (this.input.pan) this.behaviours.aimAt([point.x, point.y, point.z]);
+      else if (this.input.pan) this.behaviors.aimAt([point.x, point.y, point.z]);
     }, this.#warnOf);
   }
 
   /** Toggles all motion, for the space bar. A player's controls around the element have keys of their own. */
   toggleMotion(): boolean {
-    if (this.behaviours.motion.value?.toggle()) return true;
+    if (this.behaviors.motion.value?.toggle()) return true;
     if (!this.playback.canPlay || this.element.slot === 'media') return false;
     if (this.playback.paused) this.playback.play();
     else this.playback.pause();

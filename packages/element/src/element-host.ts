@@ -1,5 +1,5 @@
 import type { Attributes } from './attributes.js';
-import type { SpokenStrings } from './words.js';
+import type { A11yStrings } from './words.js';
 import type { SharedDevice } from './gpu/shared-device.js';
 import type { DynamicState } from './dynamic/dynamic-model.js';
 import type { SceneLimits } from './loading/protocol.js';
@@ -34,7 +34,7 @@ export interface ElementHost {
   readonly attributes: Attributes;
   readonly services: Services;
   readonly source: Source & { readonly splatShader?: unknown };
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   readonly dynamicValues: Omit<DynamicState, 'timeSeconds'>;
   part<T extends HTMLElement>(selector: string): T | null;
   warn(sentence: string): void;

@@ -15,7 +15,7 @@ import type { ElementHost } from './element-host.js';
 import type { SceneStats } from './stats.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
-import { readSpokenStrings, type SpokenStrings } from './words.js';
+import { readSpokenStrings, type A11yStrings } from './words.js';
 import type { SoundProperties } from './dynamic/sound-properties.js';
 import type { ImmersiveMethods } from './xr/methods.js';
 
@@ -161,10 +161,10 @@ export class GaussianSplatElement extends ViewingMethods {
 
   #attributes: Attributes;
   readonly #internals: ElementInternals | null;
-  #dynamicValues: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
-  #strings: SpokenStrings = {};
+  #dynamicValues: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, images: {} };
+  #strings: A11yStrings = {};
   /** Words in the language of the page. */
-  #words: SpokenStrings = {};
+  #words: A11yStrings = {};
   #lang = '';
   /** Camera attributes that the page has set since they were last applied. */
   readonly #set = new Set<keyof CameraSettings>();
@@ -297,11 +297,11 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   protected override render(): TemplateResult {
-    const { sources, reveal, behaviours, labels } = this.core;
-    const { state, progress, hasPicture } = sources;
+    const { sources, reveal, behaviors, labels } = this.core;
+    const { state, progress, hasImage } = sources;
     // If one of several scenes fails, the others stay visible.
-    const error = hasPicture ? null : this.core.sources.error;
-    const { prompt, promptWiggles, announcer, motion } = behaviours;
+    const error = hasImage ? null : this.core.sources.error;
+    const { prompt, promptWiggles, announcer, motion } = behaviors;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       canMove: this.cameraControls && error === null,

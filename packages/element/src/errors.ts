@@ -1,5 +1,5 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
-import type { SpokenStrings } from './words.js';
+import type { A11yStrings } from './words.js';
 
 /** Failure families, the values of `element.error.code`. */
 export type ElementErrorCode = 'unsupported' | 'network' | 'decode' | 'contract' | 'device-lost' | 'out-of-memory';
@@ -37,7 +37,7 @@ export function toElementError(error: unknown): ElementError {
 }
 
 /** One sentence for visitors, who can fix little: the page's own, or an English one for the kind of failure. */
-export function visitorMessage({ code, reason }: ElementError, strings: SpokenStrings): string {
+export function visitorMessage({ code, reason }: ElementError, strings: A11yStrings): string {
   const own = strings[`error-${code}`];
   if (own !== undefined) return own;
   return visitorMessages[reason] ?? VISITOR_MESSAGES[code];

@@ -3,7 +3,7 @@ import { css, html, nothing, svg, type TemplateResult } from 'lit';
 import { adoptStyles } from './styles.js';
 import { CORNER_STYLES, cornerButton } from './corner-button.js';
 import type { TemplateModel } from './template.js';
-import { languageOf, type HandWord, type SpokenStrings } from './words.js';
+import { languageOf, type HandWord, type A11yStrings } from './words.js';
 
 const WORDS: Readonly<Record<HandWord, string>> = {
   'keys-orbit':
@@ -57,7 +57,7 @@ const STYLES = css`
 /** Four corners around the center. */
 const FRAME_SIGN = 'M4 9V4h5v2H6v3zM15 4h5v5h-2V6h-3zM4 15h2v3h3v2H4zM18 15h2v5h-5v-2h3zM10 10h4v4h-4z';
 
-const word = (strings: SpokenStrings, key: HandWord): string => strings[key] ?? WORDS[key];
+const word = (strings: A11yStrings, key: HandWord): string => strings[key] ?? WORDS[key];
 
 /** The keyboard help, the prompt, and the button that resets the camera. */
 export function handsView(model: TemplateModel): TemplateResult {
@@ -71,7 +71,7 @@ export function handsView(model: TemplateModel): TemplateResult {
 }
 
 /** A dragging hand. Decorative, because screen readers announce the keys when the scene has the focus. */
-function prompt(kind: TemplateModel['prompt'], strings: SpokenStrings): TemplateResult {
+function prompt(kind: TemplateModel['prompt'], strings: A11yStrings): TemplateResult {
   const hand = svg`<path d="M9 11.24V7.5a2.5 2.5 0 0 1 5 0v3.74a4.5 4.5 0 1 0-5 0zm9.84 4.63-4.54-2.26a1 1 0 0 0-.54-.11H13v-6a1.5
     1.5 0 0 0-3 0v10.74l-3.43-.72a1 1 0 0 0-1 .33l-.57.62 4.94 4.94a1.5 1.5 0 0 0 1.06.44h6.79a1.5 1.5 0 0 0 1.48-1.29l.75-5.27a1.5
     1.5 0 0 0-.18-1.42z" />`;

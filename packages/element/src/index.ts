@@ -38,7 +38,7 @@ export type {
   WheelZoom,
 } from './attributes.js';
 export type { ViewName } from './camera/spoken.js';
-export type { SpokenStrings } from './words.js';
+export type { A11yStrings } from './words.js';
 export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint, type PickedPoint } from './camera/values.js';
 export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';

@@ -1,5 +1,5 @@
 /** The words of the element in the languages of pages: fetched where that is not English. */
-import type { SpokenStrings, Words } from './words.js';
+import type { A11yStrings, Words } from './words.js';
 
 const LANGUAGES: Readonly<Record<string, () => Promise<{ readonly words: Words }>>> = {
   de: () => import('./languages/de.js'),
@@ -17,7 +17,7 @@ const LANGUAGES: Readonly<Record<string, () => Promise<{ readonly words: Words }
  * @param lang as of the attribute `lang`: a tag of BCP 47 such as `pt-BR`, of which the language counts
  * @returns none for a language that the element does not speak
  */
-export async function wordsIn(lang: string): Promise<SpokenStrings> {
+export async function wordsIn(lang: string): Promise<A11yStrings> {
   const [language] = lang.toLowerCase().split('-');
   return Object.hasOwn(LANGUAGES, language) ? (await LANGUAGES[language]()).words : {};
 }

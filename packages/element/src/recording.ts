@@ -2,7 +2,7 @@
 import type { CameraController } from './controllers/camera-controller.js';
 import type { PlaybackController } from './controllers/playback-controller.js';
 import type { Lazy } from './lazy.js';
-import { nothingToDraw, takePicture, type PictureHost } from './picture.js';
+import { nothingToDraw, takeImage, type ImageHost } from './capture-image.js';
 import type { ImageOptions } from './viewing.js';
 import { frameCount, frameShares, type CameraPath, type PathName } from './views/camera-path.js';
 import type { Tour } from './views/tour.js';
@@ -35,10 +35,10 @@ export interface FrameOptions extends VideoOptions, ImageOptions {
   readonly frames?: number;
 }
 
-export interface RecordingHost extends PictureHost {
+export interface RecordingHost extends ImageHost {
   readonly camera: CameraController;
   readonly playback: PlaybackController;
-  readonly behaviours: { rest(): void };
+  readonly behaviors: { rest(): void };
   readonly tour: Pick<Lazy<Tour>, 'get'>;
   readonly settled: Promise<unknown>;
   /** Called after each frame, in the task that has drawn it. */
@@ -106,7 +106,7 @@ function drive(host: RecordingHost, path: CameraPath | null, duration: number, s
     const step = (): void => {
       if (isOver) return;
       if (path) {
-        host.behaviours.rest();
+        host.behaviors.rest();
         host.camera.moveTo(path.at(Math.min(1, (performance.now() - start) / duration)));
       }
       // Browsers record frames of a canvas that changes.
@@ -165,10 +165,10 @@ export async function* recordFrames(host: RecordingHost, options: FrameOptions):
   if (!before.isPaused) playback.pause();
   try {
     for (const [frame, share] of frameShares(frames, path ?? { isClosed: false }).entries()) {
-      host.behaviours.rest();
+      host.behaviors.rest();
       if (path) camera.moveTo(path.at(share));
       if (playback.canPlay) await seek(host, Math.min(playback.duration, before.time + frame / frameRate));
-      yield await takePicture(host, image);
+      yield await takeImage(host, image);
     }
   } finally {
     if (path) camera.moveTo(before.goal);

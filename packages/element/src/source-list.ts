@@ -219,7 +219,7 @@ export class SourceList implements EntryList {
     return known.length > 0 ? known.reduce((sum, share) => sum + share, 0) / shares.length : null;
   }
 
-  get hasPicture(): boolean {
+  get hasImage(): boolean {
     return this.#all.some(({ state, scene }) => state === 'ready' || scene.isPreview);
   }
 
@@ -228,9 +228,9 @@ export class SourceList implements EntryList {
   }
 
   get levels(): LodSettings {
-    const most = (of: (settings: LodSettings) => number | undefined): number =>
+    const max = (of: (settings: LodSettings) => number | undefined): number =>
       Math.max(0, ...this.members.map(({ scene }) => of(scene.detail) ?? 0));
-    return { detail: most(({ detail }) => detail), splatBudget: most(({ splatBudget }) => splatBudget) };
+    return { detail: max(({ detail }) => detail), splatBudget: max(({ splatBudget }) => splatBudget) };
   }
 
   /** Bounds of all sources in the frame of the element's own scene; null while nothing is shown. */
@@ -239,7 +239,7 @@ export class SourceList implements EntryList {
     const bounds = boundsOfWorld(this.world);
     if (bounds) this.#bounds = { ...bounds, up: this.ownEntry.member?.scene.bounds.up };
     // Scenes released out of view, or with their device, keep their bounds.
-    return bounds || this.hasPicture ? this.#bounds : null;
+    return bounds || this.hasImage ? this.#bounds : null;
   }
 
   /** The same, measured again for generators, which may have moved. */

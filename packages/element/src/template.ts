@@ -1,6 +1,6 @@
 import { html, nothing, type TemplateResult } from 'lit';
 import { visitorMessage, type ElementError } from './errors.js';
-import { languageOf, word, type SpokenStrings } from './words.js';
+import { languageOf, word, type A11yStrings } from './words.js';
 
 /** Everything that the shadow tree shows. */
 export interface TemplateModel {
@@ -27,7 +27,7 @@ export interface TemplateModel {
   /** Resets the camera; null if no button is offered. */
   readonly onReset: (() => void) | null;
   /** Words of the page in place of the English ones. */
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   /** Text for screen readers: the error, or else the camera. */
   readonly spoken: string;
   /** Hints for visitors who may move the camera, after its code has loaded. */

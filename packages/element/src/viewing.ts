@@ -2,7 +2,7 @@ import { loadModule } from '@gaussian-splat/core';
 import type { CameraOrbit, CameraTarget, FieldOfView, PickedPoint } from './camera/values.js';
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
-import type * as pictures from './picture.js';
+import type * as capture from './capture-image.js';
 import type { FrameOptions, RecordOptions } from './recording.js';
 import { boxOf, type SceneBox } from './scene-queries.js';
 import type { CameraView } from './views/camera-view.js';
@@ -89,21 +89,21 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /** Flies through all views of the list on one smooth path, or along the keyframes of its file. See {@link flyTo}. */
-  async flyAlong(options?: PathOptions): Promise<boolean> {
-    return (await this.core.tour.get()).flyAlong(options);
+  async flyPath(options?: PathOptions): Promise<boolean> {
+    return (await this.core.tour.get()).flyPath(options);
   }
 
   /**
    * Puts the camera on that path at once, for scenes that follow the page's scrolling.
    * @param share 0..1, from the first view to the last
    */
-  async showAlong(share: number): Promise<void> {
-    return (await this.core.tour.get()).showAlong(share);
+  async seekPath(share: number): Promise<void> {
+    return (await this.core.tour.get()).seekPath(share);
   }
 
   /** Shows the interaction prompt again, as if no visitor had touched the scene. */
   resetInteractionPrompt(): void {
-    this.core.behaviours.prompt?.reset();
+    this.core.behaviors.prompt?.reset();
   }
 
   /** Frames the scene as after loading, for generators whose scene has grown or moved. */
@@ -140,7 +140,7 @@ export abstract class ViewingMethods extends MediaProperties {
    * for a size that the GPU cannot draw, and with a `TypeError` for an invalid background color.
    */
   async toBlob(options: ImageOptions = {}): Promise<Blob> {
-    return (await this.#images()).takePicture(this.core, options);
+    return (await this.#images()).takeImage(this.core, options);
   }
 
   /**
@@ -160,8 +160,8 @@ export abstract class ViewingMethods extends MediaProperties {
     yield* (await this.#images()).recordFrames(this.core, options);
   }
 
-  async #images(): Promise<typeof pictures> {
-    const images = await loadModule('the code for images', () => import('./picture.js'));
+  async #images(): Promise<typeof capture> {
+    const images = await loadModule('the code for images', () => import('./capture-image.js'));
     this.applyAttributes();
     return images;
   }

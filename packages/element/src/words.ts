@@ -16,7 +16,7 @@ export const WORDS = {
 } as const;
 
 /** Words of the bar of the views, which few pages have. */
-export type ViewWord = 'views' | 'next-view' | 'previous-view' | 'keys-views';
+export type ViewString = 'views' | 'next-view' | 'previous-view' | 'keys-views';
 
 /** Words of walking, which few pages have. */
 export type WalkWord = 'keys-walk' | 'blocked';
@@ -37,7 +37,7 @@ export type Words = Readonly<
     | keyof typeof WORDS
     | keyof typeof PANEL_WORDS
     | `error-${ElementErrorCode}`
-    | ViewWord
+    | ViewString
     | WalkWord
     | HandWord
     | MotionWord
@@ -47,20 +47,20 @@ export type Words = Readonly<
 >;
 
 /** Strings of a page, or of its language, in place of the English ones. */
-export type SpokenStrings = Partial<Words>;
+export type A11yStrings = Partial<Words>;
 
 /** A word of the page, or the English one. */
-export const word = (strings: SpokenStrings, key: keyof typeof WORDS): string => strings[key] ?? WORDS[key];
+export const word = (strings: A11yStrings, key: keyof typeof WORDS): string => strings[key] ?? WORDS[key];
 
 /** The language of the element's own words: those of a page, and of {@link Words}, are in the language of the page. */
-export const languageOf = (strings: SpokenStrings): 'en' | undefined =>
+export const languageOf = (strings: A11yStrings): 'en' | undefined =>
   Object.keys(strings).length === 0 ? 'en' : undefined;
 
 /**
  * The attribute `a11y`: an object, or its JSON.
  * @returns null if it is malformed
  */
-export function readSpokenStrings(value: unknown): SpokenStrings | null {
+export function readSpokenStrings(value: unknown): A11yStrings | null {
   if (value === null || value === undefined || value === '') return {};
   let parsed: unknown = value;
   if (typeof value === 'string') {
@@ -73,5 +73,5 @@ export function readSpokenStrings(value: unknown): SpokenStrings | null {
   const isObject = typeof parsed === 'object' && parsed !== null && !Array.isArray(parsed);
   if (!isObject) return null;
   const strings = Object.entries(parsed as object).filter(([, text]) => typeof text === 'string');
-  return Object.fromEntries(strings) as SpokenStrings;
+  return Object.fromEntries(strings) as A11yStrings;
 }

@@ -34,8 +34,8 @@ for (let i = 0; i < cloud.count; i++) {
   const rotation = sign < 0 ? [-qz, -qy, qx, qw] : [qw, qx, qy, qz];
   const opacity = logit(Math.min(Math.max(cloud.opacities[i], 1e-6), 1 - 1e-6));
   const scales = Array.from(cloud.scales.subarray(3 * i, 3 * i + 3), (scale) => Math.log(Math.max(scale, 1e-9)));
-  const colour = cloud.sh.subarray(first * i, first * i + 3);
-  rows.set([sign * x, sign * y, z, ...colour, opacity, ...scales, ...rotation], i * columns.length);
+  const color = cloud.sh.subarray(first * i, first * i + 3);
+  rows.set([sign * x, sign * y, z, ...color, opacity, ...scales, ...rotation], i * columns.length);
 }
 const header = ['ply', 'format binary_little_endian 1.0', `element vertex ${cloud.count}`];
 header.push(...columns.map((name) => `property float ${name}`), 'end_header', '');

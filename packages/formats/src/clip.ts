@@ -5,7 +5,14 @@ import { grouped, startsWith, viewOf } from './bytes.js';
 import { damaged } from './faults.js';
 import { isObject, parseJson, show, type Json } from './json.js';
 import { mergeClouds } from './merge-clouds.js';
-import { MOTION_VERSION, movedCloud, MOVING, MOVING_NAMES, readMotion, type Motion } from './motion.js';
+import {
+  MOTION_VERSION,
+  applyMotion,
+  ANIMATED_ATTRIBUTES,
+  ANIMATED_ATTRIBUTE_NAMES,
+  readMotion,
+  type Motion,
+} from './motion.js';
 import { readScene } from './read-scene.js';
 
 const MAGIC = 'GSV\n';
@@ -17,7 +24,7 @@ const MAX_GROUP_FRAMES = 4096;
 const MAX_PARTS = 8;
 const MAX_GROUPS = 1_000_000;
 /** Maximum number of code planes of a splat for each frame of its group. */
-const PLANES_PER_FRAME = MOVING_NAMES.reduce((sum, name) => sum + MOVING[name], 0);
+const PLANES_PER_FRAME = ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name], 0);
 
 /** Some of the splats of a group, and their motion: two contiguous sections of the file. */
 export interface ClipPart {
@@ -174,14 +181,14 @@ class IndexReader {
     return this.#fail(path, 'three numbers', value);
   }
 
-  #number(path: string, value: unknown, least: number, most: number): number {
-    const isNumber = typeof value === 'number' && value >= least && value <= most;
-    return isNumber ? value : this.#fail(path, `a number from ${least} to ${most}`, value);
+  #number(path: string, value: unknown, min: number, max: number): number {
+    const isNumber = typeof value === 'number' && value >= min && value <= max;
+    return isNumber ? value : this.#fail(path, `a number from ${min} to ${max}`, value);
   }
 
-  #whole(path: string, value: unknown, least: number, most: number): number {
-    if (Number.isInteger(value)) return this.#number(path, value, least, most);
-    return this.#fail(path, `a whole number from ${least} to ${grouped(most)}`, value);
+  #whole(path: string, value: unknown, min: number, max: number): number {
+    if (Number.isInteger(value)) return this.#number(path, value, min, max);
+    return this.#fail(path, `a whole number from ${min} to ${grouped(max)}`, value);
   }
 
   #fail(path: string, expected: string, found: unknown): never {
@@ -248,7 +255,10 @@ export async function readClipPart({ bytes, part, frames, name, limits }: ClipPa
     ...{ bytes: bytes.subarray(sceneBytes), name, splats, frames, budget },
     version: MOTION_VERSION.lives,
   });
-  const found = MOVING_NAMES.reduce((sum, each) => sum + MOVING[each] * motion.parts[each].rank, 0);
+  const found = ANIMATED_ATTRIBUTE_NAMES.reduce(
+    (sum, each) => sum + ANIMATED_ATTRIBUTES[each] * motion.parts[each].rank,
+    0,
+  );
   if (found !== planes) throw damaged(name, `${planes} planes, as the index says`, String(found), 'decode/header');
   return { cloud, motion };
 }
@@ -264,7 +274,7 @@ export function clipFrame(
   name: string,
   budget: LoadBudget,
 ): GaussianCloud {
-  const moved = parts.map(({ cloud, motion }) => movedCloud(cloud, motion, frame, name, budget));
+  const moved = parts.map(({ cloud, motion }) => applyMotion(cloud, motion, frame, name, budget));
   return keepUsable(
     mergeClouds(
       moved.map((cloud) => ({ cloud, first: 0, count: cloud.count })),

@@ -4,7 +4,7 @@ import { grouped } from './bytes.js';
 import { reasonsOf } from './scene-errors.js';
 
 /** Minimum percentage of drawable splats; with fewer, the scene is unrecognizable. */
-const LEAST_PERCENT = 10;
+const MIN_PERCENT = 10;
 
 /**
  * Returns the cloud with a warning about its dropped splats.
@@ -14,7 +14,7 @@ export function withLeftOut(cloud: GaussianCloud, name: string): GaussianCloud {
   const { count, droppedCount, faults = [], warnings = [] } = cloud;
   const all = count + droppedCount;
   const found = `${grouped(droppedCount)} of ${grouped(all)} splats cannot be drawn: ${reasonsOf(faults)}`;
-  if (100 * count >= LEAST_PERCENT * all) return { ...cloud, warnings: [...warnings, `${found}. They are left out.`] };
+  if (100 * count >= MIN_PERCENT * all) return { ...cloud, warnings: [...warnings, `${found}. They are left out.`] };
   throw new GaussianSplatError('decode/corrupt', {
     where: name,
     expected: 'splats most of which can be drawn',

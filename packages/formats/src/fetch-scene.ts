@@ -5,7 +5,7 @@ import { quote } from './bytes.js';
 import { Download } from './download.js';
 import { label } from './network-errors.js';
 import { outOfMemory } from './scene-errors.js';
-import type { OpenPart } from './scene-format.js';
+import type { OpenFile } from './scene-format.js';
 
 /** `maxBytes` and `maxSeconds` end the download with `out-of-memory/budget`. */
 export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSeconds'> {
@@ -35,7 +35,7 @@ export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSec
 /** Pause before the first resumption, ms; it doubles each time. */
 const RETRY_DELAY_MS = 250;
 /** Minimum progress in bytes, so that a file is not loaded with a connection for each byte. */
-const LEAST_PROGRESS = 65_536;
+const MIN_PROGRESS = 65_536;
 
 /**
  * Downloads a file with exact progress. A connection that is interrupted, or that transfers less than 1 KiB in 30 s, is
@@ -81,7 +81,7 @@ async function bring(download: Download, signal: AbortSignal | undefined, retrie
       signal?.throwIfAborted();
       if (!(error instanceof GaussianSplatError) || error.code !== 'network/interrupted') throw error;
       const { length } = download.bytes;
-      if (length >= farthest + LEAST_PROGRESS) [tries, farthest] = [0, length];
+      if (length >= farthest + MIN_PROGRESS) [tries, farthest] = [0, length];
       // Any further error is reported as the interrupted connection.
       do await pause(error);
       while (!(await download.resume()));
@@ -136,7 +136,7 @@ function delay(ms: number, signal: AbortSignal | undefined): Promise<void> {
  * @param url Absolute address of the scene's own file.
  * @param optionsOf Options for each file, by its path.
  */
-export function openPartAt(url: string | URL, optionsOf: (path: string) => FetchSceneOptions): OpenPart {
+export function fileOpenerFor(url: string | URL, optionsOf: (path: string) => FetchSceneOptions): OpenFile {
   return (path, query) => fetchScene(partAddress(url, path, query), optionsOf(path));
 }
 

@@ -1,14 +1,14 @@
 export { LoadBudget, type LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
-export { fetchScene, openPartAt, type FetchSceneOptions } from './fetch-scene.js';
+export { fetchScene, fileOpenerFor, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './late-formats.js';
 export { fetchRange, type FetchedRange } from './fetch-range.js';
 export { outOfMemory } from './scene-errors.js';
 export { readLodScene, sogAddress, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';
-export { readCoarsest } from './lod/read-coarsest.js';
+export { readCoarsestLevel } from './lod/read-coarsest.js';
 export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { readPrefix } from './read-prefix.js';
-export { MOST_DROPPED, readScene, type ReadSceneOptions } from './read-scene.js';
+export { MAX_DROPPED_RATIO, readScene, type ReadSceneOptions } from './read-scene.js';
 export { readTriangles, type TriangleFile, type TriangleSource } from './triangles/read-triangles.js';
 export { Ktx2Decoder } from './triangles/ktx2.js';
 export type { ImageFile } from './triangles/images.js';
@@ -18,7 +18,7 @@ export type { FileBytes } from './bytes.js';
 export {
   frameAt,
   framePath,
-  movedFrame,
+  motionFrame,
   parseSequence,
   sequencePaths,
   type FramePattern,
@@ -29,15 +29,15 @@ export {
 export {
   MOTION_MODES,
   MOTION_VERSION,
-  movedCloud,
-  MOVING,
-  MOVING_NAMES,
+  applyMotion,
+  ANIMATED_ATTRIBUTES,
+  ANIMATED_ATTRIBUTE_NAMES,
   readMotion,
   type Lives,
   type Motion,
   type MotionFile,
-  type MovingName,
-  type MovingPart,
+  type AnimatedAttributeName,
+  type AnimatedAttribute,
 } from './motion.js';
 export {
   clipFrame,
@@ -54,7 +54,7 @@ export {
   type ClipPart,
   type ClipPartContent,
 } from './clip.js';
-export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
+export type { OpenFile, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
 export { turned, upright, uprightRotation } from './transform/upright.js';
 export { samplePreview } from './preview.js';

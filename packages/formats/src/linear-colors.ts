@@ -11,7 +11,7 @@ function encoded(linear: number): number {
 }
 
 /** Smaller deviations use the slope of the curve itself. */
-const LEAST_DEVIATION = 1e-4;
+const MIN_DEVIATION = 1e-4;
 
 /**
  * Encodes linear colors as sRGB, in place. The mean color of a splat is exact; its change with direction is multiplied
@@ -30,7 +30,7 @@ export function encodeLinearColors(cloud: DraftCloud, source: string): void {
       sh[at] = (encoded(linear) - 0.5) / SH_C0;
       if (squares === 0) continue;
       // The basis is orthonormal, so the mean square over all directions is the sum of squares divided by 4π.
-      const deviation = Math.max(LEAST_DEVIATION, Math.sqrt(squares / (4 * Math.PI)));
+      const deviation = Math.max(MIN_DEVIATION, Math.sqrt(squares / (4 * Math.PI)));
       const slope = (encoded(linear + deviation) - encoded(linear - deviation)) / (2 * deviation);
       for (let k = 3; k < stride; k += 3) sh[at + k] *= slope;
     }

@@ -16,10 +16,10 @@ export interface CloudPart {
  */
 export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSource, 'budget' | 'name'>): DraftCloud {
   const count = parts.reduce((sum, part) => sum + part.count, 0);
-  const degree = parts.reduce<ShDegree>((most, { cloud }) => (cloud.shDegree > most ? cloud.shDegree : most), 0);
+  const degree = parts.reduce<ShDegree>((max, { cloud }) => (cloud.shDegree > max ? cloud.shDegree : max), 0);
   const merged = allocateCloud(count, degree, source);
   const largest = parts.reduce<CloudPart | undefined>(
-    (most, part) => (part.count > (most?.count ?? -1) ? part : most),
+    (max, part) => (part.count > (max?.count ?? -1) ? part : max),
     undefined,
   );
   merged.origin = largest?.cloud.origin ?? [0, 0, 0];

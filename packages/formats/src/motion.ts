@@ -6,24 +6,24 @@ import { damaged } from './faults.js';
 import { noSplats } from './scene-errors.js';
 
 /** Animated attributes, in the order of files, and their numbers for each splat. */
-export const MOVING = { position: 3, rotation: 3, scale: 3, opacity: 1, color: 3 } as const;
-export type MovingName = keyof typeof MOVING;
-export const MOVING_NAMES = Object.keys(MOVING) as readonly MovingName[];
+export const ANIMATED_ATTRIBUTES = { position: 3, rotation: 3, scale: 3, opacity: 1, color: 3 } as const;
+export type AnimatedAttributeName = keyof typeof ANIMATED_ATTRIBUTES;
+export const ANIMATED_ATTRIBUTE_NAMES = Object.keys(ANIMATED_ATTRIBUTES) as readonly AnimatedAttributeName[];
 
 /** Versions of files: all splats exist in every frame, or each splat has a lifetime. */
 export const MOTION_VERSION = { everywhere: 1, lives: 2 } as const;
 type MotionVersion = (typeof MOTION_VERSION)[keyof typeof MOTION_VERSION];
 /** Version, splats, frames; a rank and a step for each of {@link ANIMATED_ATTRIBUTES}. */
-const HEAD_BYTES = 4 * (3 + 2 * MOVING_NAMES.length);
+const HEAD_BYTES = 4 * (3 + 2 * ANIMATED_ATTRIBUTE_NAMES.length);
 /** Compressed bytes fed in one step, see Gunzip. */
 const FEED_BYTES = 16_384;
 /** Coding of codes: plain, or as differences from the previous one. */
 export const MOTION_MODES = { plain: 0, differences: 1 } as const;
 /** Limit of curve values; curves have a length of about 1 for each frame. */
-const MOST_CURVE = 1e6;
+const MAX_CURVE = 1e6;
 
 /** Motion of one attribute: at frame f it changes by step · Σ_k curves[f, k] · codes[number, k]. */
-export interface MovingPart {
+export interface AnimatedAttribute {
   /** Number of curves, which all splats share; 0: the attribute does not change. */
   readonly rank: number;
   readonly step: number;
@@ -43,7 +43,7 @@ export interface Lives {
 export interface Motion {
   readonly splats: number;
   readonly frames: number;
-  readonly parts: Readonly<Record<MovingName, MovingPart>>;
+  readonly parts: Readonly<Record<AnimatedAttributeName, AnimatedAttribute>>;
   /** Undefined: every splat exists in all frames. */
   readonly lives?: Lives;
 }
@@ -126,11 +126,11 @@ function lengthFrom(
       'decode/header',
     );
   }
-  return MOVING_NAMES.reduce(
+  return ANIMATED_ATTRIBUTE_NAMES.reduce(
     (sum, part, k) => {
       const rank = rankAt(view, k);
       if (rank > frames) throw damaged(name, `at most ${frames} curves`, `${rank} for ${part}`, 'decode/header');
-      return sum + 4 * frames * rank + MOVING[part] * rank * (1 + 2 * splats);
+      return sum + 4 * frames * rank + ANIMATED_ATTRIBUTES[part] * rank * (1 + 2 * splats);
     },
     HEAD_BYTES + (hasLives(version) ? 4 * splats : 0),
   );
@@ -153,16 +153,18 @@ class MotionReader {
   read(): Motion {
     const { splats, frames, budget } = this.#asked;
     const view = viewOf(this.#bytes);
-    const curves = MOVING_NAMES.map((_, k) => this.#curves(view, frames * rankAt(view, k)));
-    const modes = this.#take(MOVING_NAMES.reduce((sum, part, k) => sum + MOVING[part] * rankAt(view, k), 0));
+    const curves = ANIMATED_ATTRIBUTE_NAMES.map((_, k) => this.#curves(view, frames * rankAt(view, k)));
+    const modes = this.#take(
+      ANIMATED_ATTRIBUTE_NAMES.reduce((sum, part, k) => sum + ANIMATED_ATTRIBUTES[part] * rankAt(view, k), 0),
+    );
     budget.take(2 * splats * modes.length, this.#name);
     const lives = hasLives(this.#asked.version) ? this.#lives() : undefined;
     let plane = 0;
-    const parts = MOVING_NAMES.map((part, k): [MovingName, MovingPart] => {
+    const parts = ANIMATED_ATTRIBUTE_NAMES.map((part, k): [AnimatedAttributeName, AnimatedAttribute] => {
       const rank = rankAt(view, k);
       const step = view.getFloat32(16 + 8 * k, true);
       if (rank > 0 && !(step > 0 && step < Infinity)) throw damaged(this.#name, 'steps above 0', `${step} for ${part}`);
-      const codes = Array.from({ length: MOVING[part] * rank }, () => this.#codes(modes[plane++]));
+      const codes = Array.from({ length: ANIMATED_ATTRIBUTES[part] * rank }, () => this.#codes(modes[plane++]));
       return [part, { rank, step, curves: curves[k], codes }];
     });
     return { splats, frames, parts: Object.fromEntries(parts) as Motion['parts'], ...(lives && { lives }) };
@@ -189,7 +191,7 @@ class MotionReader {
   #curves(view: DataView, count: number): Float32Array {
     const found = Float32Array.from({ length: count }, (_, i) => view.getFloat32(this.#at + 4 * i, true));
     this.#at += 4 * count;
-    if (found.every((value) => Math.abs(value) <= MOST_CURVE)) return found;
+    if (found.every((value) => Math.abs(value) <= MAX_CURVE)) return found;
     throw damaged(this.#name, 'curves of finite numbers', 'others');
   }
 
@@ -214,7 +216,7 @@ class MotionReader {
  * @param budget Is charged for them.
  * @throws GaussianSplatError `decode/empty` if no splat is drawable, `out-of-memory/budget`
  */
-export function movedCloud(
+export function applyMotion(
   first: GaussianCloud,
   { parts, lives }: Motion,
   frame: number,
@@ -231,10 +233,10 @@ export function movedCloud(
     sh: first.sh.slice(),
   };
   const change = new Float32Array(first.count);
-  const eachNumber = (part: MovingName, put: (number: number) => void): void => {
+  const eachNumber = (part: AnimatedAttributeName, put: (number: number) => void): void => {
     const { rank, step, curves, codes } = parts[part];
     if (rank === 0) return;
-    for (let number = 0; number < MOVING[part]; number++) {
+    for (let number = 0; number < ANIMATED_ATTRIBUTES[part]; number++) {
       change.fill(0);
       for (let k = 0; k < rank; k++) {
         const factor = step * curves[rank * frame + k];

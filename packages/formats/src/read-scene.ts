@@ -4,10 +4,10 @@ import { plainBytes, type FileBytes } from './bytes.js';
 import { signedFormat } from './formats.js';
 import { loadDetection, loadDiagnosis, loadLeftOut, loadPreviews, loadReader } from './load-parts.js';
 import { emptyFile, noSplats, outOfMemory } from './scene-errors.js';
-import { previewWanted, type OpenPart, type SceneSource } from './scene-format.js';
+import { previewWanted, type OpenFile, type SceneSource } from './scene-format.js';
 
 /** Maximum fraction of a file's splats that may be dropped without a warning. */
-export const MOST_DROPPED = 0.05;
+export const MAX_DROPPED_RATIO = 0.05;
 
 export interface ReadSceneOptions extends LoadLimits {
   /** File name or URL: used in error messages, and its extension identifies formats without a signature. */
@@ -20,7 +20,7 @@ export interface ReadSceneOptions extends LoadLimits {
    * Opens the other files of a scene of several files (SOG folders, streamed SOG, glTF with external buffers);
    * `fileOpenerFor` returns one for an address. Archives need none.
    */
-  readonly openPart?: OpenPart;
+  readonly openFile?: OpenFile;
   /**
    * Level of detail of a streamed scene to read, 0 (default) is the finest; `all` reads all of them, for renderers that
    * select: see `GaussianCloud.levelRuns`.
@@ -29,7 +29,7 @@ export interface ReadSceneOptions extends LoadLimits {
   /**
    * Upper limit of splats for streamed SOG: the finest level within it is read; if all levels have more, the coarsest.
    */
-  readonly mostSplats?: number;
+  readonly maxSplats?: number;
   /**
    * Called with a preview before the whole scene is read, if it is large and its format allows: some of its splats,
    * spread over all of it and enlarged to represent the rest. Reading continues once the promise resolves.
@@ -51,7 +51,7 @@ export interface ReadSceneOptions extends LoadLimits {
  * named AbortError, once it is aborted.
  */
 export async function readScene(file: FileBytes, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
-  const { name = 'scene', contentType = '', signal, openPart, level, mostSplats, onPreview } = options;
+  const { name = 'scene', contentType = '', signal, openFile, level, maxSplats, onPreview } = options;
   signal?.throwIfAborted();
   const bytes = plainBytes(file, name);
   if (bytes.length === 0) throw emptyFile(name);
@@ -75,16 +75,16 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   const budget = new LoadBudget(bytes.length, options);
   const known = new Set<string>();
   const openPlain =
-    openPart &&
+    openFile &&
     (async (path: string, query = '') => {
-      const part = plainBytes(await openPart(path, query || undefined), path);
+      const part = plainBytes(await openFile(path, query || undefined), path);
       // A repeated file is charged once.
       if (!known.has(path + query)) budget.arrive(part.length);
       known.add(path + query);
       return part;
     });
   const source: SceneSource = {
-    ...{ bytes, name, budget, signal, openPart: openPlain, level, mostSplats },
+    ...{ bytes, name, budget, signal, openFile: openPlain, level, maxSplats },
     onPreview: onPreview && preview,
   };
   const whole = await (async () => read(source))().catch((error: unknown) => {
@@ -100,7 +100,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   signal?.throwIfAborted();
   const { count, droppedCount } = cloud;
   if (count === 0) throw noSplats(name, cloud);
-  if (droppedCount <= MOST_DROPPED * (count + droppedCount)) return cloud;
+  if (droppedCount <= MAX_DROPPED_RATIO * (count + droppedCount)) return cloud;
   const { withLeftOut } = await loadLeftOut();
   return withLeftOut(cloud, name);
 }

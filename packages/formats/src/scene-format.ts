@@ -24,11 +24,11 @@ export interface SceneSource {
   /** Whether the SPZ is embedded in a glTF: its coordinates are then those of SPZ's specification. */
   readonly isWithinGltf?: boolean;
   /** Opens the other files of a scene of several files; absent for a single file. */
-  readonly openPart?: OpenPart;
+  readonly openFile?: OpenFile;
   /** Level of detail to read: 0 is the finest. `all`: all of them, in the runs of `GaussianCloud.levelRuns`. */
   readonly level?: number | 'all';
-  /** See `ReadSceneOptions.mostSplats`. */
-  readonly mostSplats?: number | undefined;
+  /** See `ReadSceneOptions.maxSplats`. */
+  readonly maxSplats?: number | undefined;
   /** Called with a preview before the whole scene is read. See `ReadSceneOptions.onPreview`. */
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
@@ -48,7 +48,7 @@ export function previewWanted({ onPreview }: SceneSource, count: number): boolea
  * @param query Query that the scene appends for the server, from its `?` on; absent for none.
  * @returns The whole file.
  */
-export type OpenPart = (path: string, query?: string) => Promise<Uint8Array>;
+export type OpenFile = (path: string, query?: string) => Promise<Uint8Array>;
 
 /**
  * Reads one file format into a cloud. A reader checks every size against the available bytes and charges it to the

@@ -104,15 +104,15 @@ function motionOf({ motion, framesPerFile, count }: Json, fail: Fail): SequenceM
   if (!Number.isInteger(framesPerFile) || (framesPerFile as number) < 1 || (framesPerFile as number) > MAX_PER_FILE) {
     fail('framesPerFile', `1 to ${grouped(MAX_PER_FILE)}`, framesPerFile);
   }
-  const most = Math.ceil(((count as number) - 1) / (framesPerFile as number));
+  const max = Math.ceil(((count as number) - 1) / (framesPerFile as number));
   const isPattern = typeof motion === 'string';
-  const files = isPattern ? patternOf(motion, 'motion', fail) : pathsOf(motion, 'motion', fail, most);
-  if (Array.isArray(files) && files.length !== most) fail('motion', `${grouped(most)} paths`, files.length);
+  const files = isPattern ? patternOf(motion, 'motion', fail) : pathsOf(motion, 'motion', fail, max);
+  if (Array.isArray(files) && files.length !== max) fail('motion', `${grouped(max)} paths`, files.length);
   return { frames: files, framesPerFile: framesPerFile as number };
 }
 
 /** Returns the location of a frame without a scene file of its own; undefined for one with it. */
-export function movedFrame({ motion, frameCount }: SceneSequence, frame: number): MovedFrame | undefined {
+export function motionFrame({ motion, frameCount }: SceneSequence, frame: number): MovedFrame | undefined {
   if (motion === undefined || frame === 0) return undefined;
   const { framesPerFile } = motion;
   const file = Math.floor((frame - 1) / framesPerFile);
@@ -156,8 +156,8 @@ function patternOf(pattern: string, path: string, fail: Fail): FramePattern {
   return { before, behind, first: Number(digits), digits: digits.length };
 }
 
-function pathsOf(paths: unknown, path: string, fail: Fail, least = 1): readonly string[] {
-  const isList = Array.isArray(paths) && paths.length >= Math.min(1, least) && paths.length <= MAX_FRAMES;
+function pathsOf(paths: unknown, path: string, fail: Fail, min = 1): readonly string[] {
+  const isList = Array.isArray(paths) && paths.length >= Math.min(1, min) && paths.length <= MAX_FRAMES;
   if (isList && paths.every((each) => typeof each === 'string' && each !== '')) return paths as string[];
   return fail(path, `1 to ${grouped(MAX_FRAMES)} paths, or one with {0001} in it`, paths);
 }

@@ -63,7 +63,7 @@ export function contentsAt(
 /** Content of a tile at a level, and the height of its subtree. */
 function drawnOf(tile: Tile, level: number): { contents: TileContent[]; height: number } {
   const below = tile.children.map((child) => drawnOf(child, level));
-  const height = below.reduce((most, child) => Math.max(most, child.height + 1), 0);
+  const height = below.reduce((max, child) => Math.max(max, child.height + 1), 0);
   const inner = below.flatMap(({ contents }) => contents);
   const isLowest = height <= level || inner.length === 0;
   if (isLowest && tile.contents.length > 0) return { contents: [...tile.contents], height };

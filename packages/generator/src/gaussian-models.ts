@@ -225,12 +225,12 @@ export class GaussianModels {
 
 /** Merges controls and images by name; other fields of the second override the first. */
 function merged(state: GeneratorState, over: GeneratorState): GeneratorState {
-  const { controls, pictures } = state;
+  const { controls, images } = state;
   return {
     ...state,
     ...over,
     ...(controls && over.controls ? { controls: { ...controls, ...over.controls } } : {}),
-    ...(pictures && over.pictures ? { pictures: { ...pictures, ...over.pictures } } : {}),
+    ...(images && over.images ? { images: { ...images, ...over.images } } : {}),
   };
 }
 

@@ -1,6 +1,6 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core/contract';
 import { Chain } from './chain/chain.js';
-import { imageShapeOf } from './bind-pictures.js';
+import { imageShapeOf } from './bind-images.js';
 import { sameInputs, type GpuTensor, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
 import type { SessionKind } from './runtime/ort-session.js';
@@ -19,13 +19,13 @@ export interface PostProcessorOptions extends AcquireOptions {
    * Called with the finished image, [1,3,H,W]. It must submit its work before it returns: afterwards the runtime reuses
    * the buffer.
    */
-  readonly onPicture: (picture: FinishedImage) => void;
+  readonly onImage: (image: FinishedImage) => void;
   /** Called when a run fails. The next request tries again. */
   readonly onError?: (error: unknown) => void;
 }
 
 /** Number of runs of one image after which a filter that keeps 0.8 of its output is within 1/1000 of its limit. */
-const MOST_REPEATS = 32;
+const MAX_REPEATS = 32;
 
 interface RunRequest {
   readonly inputs: readonly Inputs[];
@@ -55,7 +55,7 @@ export class PostProcessor {
   private constructor(chain: Chain, options: PostProcessorOptions) {
     this.#chain = chain;
     this.#options = options;
-    this.input = pictureInput(chain.models);
+    this.input = imageInput(chain.models);
     this.depth = depthInput(chain.models);
     this.#loop = new RunLoop({
       queue: chain.device.queue,
@@ -107,7 +107,7 @@ export class PostProcessor {
 
   /** Whether another run of the same image may still change the result. */
   get isConverging(): boolean {
-    return this.#shown !== undefined && this.#keepsState && this.#repeats < MOST_REPEATS;
+    return this.#shown !== undefined && this.#keepsState && this.#repeats < MAX_REPEATS;
   }
 
   /** From the start of the last finished run until the GPU had finished it, ms; undefined before. */
@@ -127,10 +127,10 @@ export class PostProcessor {
    * @param state With `depth` if a model takes it: see {@link depth}.
    * @throws GaussianSplatError `argument/value` if the image or the state does not match the model.
    */
-  request(picture: GpuTensor, state: GeneratorState = {}): void {
+  request(image: GpuTensor, state: GeneratorState = {}): void {
     if (this.#loop.isClosed) return;
-    const pictures = { ...state.pictures, [this.input.name]: picture };
-    this.#loop.request({ inputs: this.#chain.bind({ ...state, pictures }) });
+    const images = { ...state.images, [this.input.name]: image };
+    this.#loop.request({ inputs: this.#chain.bind({ ...state, images }) });
   }
 
   /** Closes it: a run in progress has no effect any more. */
@@ -159,19 +159,19 @@ export class PostProcessor {
       if (this.#loop.isClosed) return;
       this.#repeats = this.#isShown(inputs) ? this.#repeats + 1 : 0;
       this.#shown = inputs;
-      this.#options.onPicture({ buffer: tensors[name], dtype, dims: dims[name], version: ++this.#version });
+      this.#options.onImage({ buffer: tensors[name], dtype, dims: dims[name], version: ++this.#version });
     });
   }
 }
 
-function pictureInput(models: readonly GeneratorModel[]): ImageInput {
+function imageInput(models: readonly GeneratorModel[]): ImageInput {
   const [{ header, contract }] = models;
   const inputs = header.inputs.filter(({ name }) => contract.inputs[name].role === 'image');
   const faults = models
     .filter(({ layout }) => layout !== undefined)
     .map((model) => unsuitable(model, 'a model that writes an image', 'a model that writes Gaussians'));
-  const pictures = inputs.reduce((sum, input) => sum + imageShapeOf(input).views, 0);
-  if (pictures !== 1) faults.push(unsuitable(models[0], 'one input with the role image', `${pictures} pictures`));
+  const images = inputs.reduce((sum, input) => sum + imageShapeOf(input).views, 0);
+  if (images !== 1) faults.push(unsuitable(models[0], 'one input with the role image', `${images} pictures`));
   if (faults.length > 0) throw new ContractError(faults);
   const [input] = inputs;
   return { name: input.name, ...imageShapeOf(input) };

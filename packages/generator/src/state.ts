@@ -26,7 +26,7 @@ export interface GeneratorState {
    * Images [1,3,H,W] by the names of inputs with the role `image`, for example from the renderer's `ImageTensor`;
    * required by every such input that no earlier model of a chain writes.
    */
-  readonly pictures?: Readonly<Record<string, GpuTensor>>;
+  readonly images?: Readonly<Record<string, GpuTensor>>;
   /** Depth [1,1,H,W] of the frame that a post-processor takes, for example made by the renderer's `ImageTensor`; needed by inputs with the role `depth`. */
   readonly depth?: GpuTensor;
 }

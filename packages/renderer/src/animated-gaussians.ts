@@ -1,5 +1,5 @@
 import { GaussianSplatError, type ShDegree, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
 import * as layouts from './generated/clip-layouts.js';
 import { animate } from './generated/clip-shaders.js';
 import { constants } from './generated/shaders.js';
@@ -55,7 +55,7 @@ export class AnimatedGaussians implements GaussianScene {
   readonly antialiased: boolean;
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
@@ -145,7 +145,7 @@ export class AnimatedGaussians implements GaussianScene {
    * @returns Number of bytes that were uploaded.
    * @throws GaussianSplatError `argument/value` for a part that does not fit
    */
-  write(slot: number, part: number, content: PackedAnimation, most = Infinity): number {
+  write(slot: number, part: number, content: PackedAnimation, max = Infinity): number {
     const to = this.#slots[slot][part];
     if (to.content !== content) {
       for (const name of PIECES)
@@ -159,7 +159,7 @@ export class AnimatedGaussians implements GaussianScene {
     for (const name of PIECES) {
       const { buffer, byteOffset, byteLength } = content[name];
       const from = Math.max(0, to.written - at);
-      const length = Math.min(byteLength - from, 4 * Math.floor((most - (to.written - begin)) / 4));
+      const length = Math.min(byteLength - from, 4 * Math.floor((max - (to.written - begin)) / 4));
       if (length > 0) {
         this.#device.queue.writeBuffer(to.buffers[name], from, buffer, byteOffset + from, length);
         to.written += length;

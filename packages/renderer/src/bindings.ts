@@ -1,6 +1,6 @@
 import type { GeometryReading } from './geometry-reading.js';
 import type { PageRequests } from './gaussian-scene.js';
-import type { PageTable } from './page-table.js';
+import type { BlockTable } from './page-table.js';
 import type { Scratch } from './scratch.js';
 import type { DetailBudget } from './stages/detail-budget.js';
 import { SortStage } from './stages/sort.js';
@@ -38,7 +38,7 @@ export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threa
 }
 
 /** Bind groups of one block. */
-interface PageBindings {
+interface BlockBindings {
   readonly splatCount: number;
   /** Only for a block of a streamed scene. */
   readonly requests?: { readonly of: PageRequests; readonly note: GPUBindGroup };
@@ -58,19 +58,19 @@ interface BudgetBindings {
 
 /** Resources for {@link FrameBindings}. */
 export interface FrameBuffers {
-  readonly table: PageTable;
+  readonly table: BlockTable;
   readonly scratch: Scratch;
 }
 
 /** Bind groups of all stages before the rasterizer, for one block table and one capacity. */
 export class FrameBindings {
-  readonly pages: readonly PageBindings[];
+  readonly pages: readonly BlockBindings[];
   /** Only with levels of detail. */
   readonly budget: BudgetBindings | undefined;
   /** Plans the survivors in the order of the file. */
   readonly plan: GPUBindGroup;
   readonly #sorts = new Map<number, ReturnType<SortStage['bind']>>();
-  readonly table: PageTable;
+  readonly table: BlockTable;
   readonly scratch: Scratch;
   readonly #stages: Stages;
 
@@ -101,7 +101,7 @@ export class FrameBindings {
 }
 
 function bindBudget(
-  table: PageTable,
+  table: BlockTable,
   { detailCounts: detail_counts, chunkShares }: Scratch,
 ): BudgetBindings | undefined {
   const stages = table.detailBudget;
@@ -116,7 +116,7 @@ function bindBudget(
   );
 }
 
-function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBindings[] {
+function bindPages(stages: Stages, table: BlockTable, scratch: Scratch): BlockBindings[] {
   const { chunkShares, visibleBits, groupOffsets, cullStats, plan, splats, keys, order } = scratch;
   // The sort needs its first order buffer only after `project` has read the survivors from it.
   const survivors = order[0];

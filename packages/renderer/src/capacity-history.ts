@@ -23,7 +23,7 @@ const SAME_VIEW_MS = 1_000;
  */
 const EXPONENTS: Capacity = { visible: 0.25, pairs: 0.5 };
 /** Upper limit of the factor that the settings of motion alone cause, beyond the ratio of pixels. */
-const MOST_OF_MOTION = 2;
+const MAX_MOTION_SHARE = 2;
 
 const NOTHING: Capacity = { visible: 0, pairs: 0 };
 
@@ -110,7 +110,7 @@ export class CapacityHistory {
     const times = wholePixels / pixels;
     const estimate = (key: keyof Capacity): number => {
       const ratio = need[key] * (times / seen) ** EXPONENTS[key];
-      return Math.ceil(used[key] * Math.max(1, Math.min(MOST_OF_MOTION * times, ratio)));
+      return Math.ceil(used[key] * Math.max(1, Math.min(MAX_MOTION_SHARE * times, ratio)));
     };
     return { visible: estimate('visible'), pairs: estimate('pairs') };
   }

@@ -6,15 +6,15 @@ import type { Scratch } from './scratch.js';
 
 /** Bounds of the capacity; the lower one may change, so it is read at every sample. */
 export interface CapacityBounds {
-  readonly least: () => Capacity;
-  readonly most: Capacity;
+  readonly min: () => Capacity;
+  readonly max: Capacity;
 }
 
 /** Scenes up to this size get capacity for all their splats at once: 64 MB. */
 const SMALL_SCENE = 1_300_000;
-const LEAST_PAIRS = 1 << 16;
+const MIN_PAIRS = 1 << 16;
 /** Minimum capacity of nearly empty buffers. */
-export const LEAST_CAPACITY: Capacity = { visible: 1, pairs: LEAST_PAIRS };
+export const MIN_CAPACITY: Capacity = { visible: 1, pairs: MIN_PAIRS };
 /** Initial capacity of small scenes in pairs, so that a close first frame fits: 32 MB. */
 const GENEROUS_PAIRS = 1 << 21;
 /** Factor of the capacity over the need. */
@@ -23,7 +23,7 @@ const HEADROOM = 1.25;
 const FULL = 0.92;
 const SLACK = 0.7;
 /** Minimum of bytes that shrinking must free. */
-const LEAST_SAVING = 32 << 20;
+const MIN_SAVING = 32 << 20;
 const BYTES_PER_VISIBLE = 40;
 const BYTES_PER_PAIR = 16;
 /** Frames between two samples after the first frames. */
@@ -43,11 +43,11 @@ const PAIRS_PER_BUDGETED = 1.1;
 const COUNT_BYTES = 20;
 
 /** Capacity before the first frame. */
-export function initialCapacity(splats: number, most: Capacity, isBudgeted = false): Capacity {
-  const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
+export function initialCapacity(splats: number, max: Capacity, isBudgeted = false): Capacity {
+  const visible = Math.min(max.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
   const usual = Math.ceil((isBudgeted ? PAIRS_PER_BUDGETED : PAIRS_PER_SPLAT) * visible);
-  const pairs = Math.max(LEAST_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), usual);
-  return { visible, pairs: Math.min(most.pairs, pairs) };
+  const pairs = Math.max(MIN_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), usual);
+  return { visible, pairs: Math.min(max.pairs, pairs) };
 }
 
 /** Counts of one frame. */
@@ -104,7 +104,7 @@ export class CapacityMonitor {
   #frame = 0;
   /** The last drawn frame, the last sampled one, and the time of that sample. */
   #drawn: SampledFrame = { pixels: 0, wholePixels: 0, isWhole: true };
-  #picture = this.#drawn;
+  #image = this.#drawn;
   #sampledAt = -Infinity;
   #isReading = false;
   #isDestroyed = false;
@@ -139,16 +139,16 @@ export class CapacityMonitor {
    * @returns Whether to sample this frame; then {@link record} must be called before the submit and {@link read} after
    * it.
    */
-  isDue(isOpen: boolean, picture: SampledFrame): boolean {
-    const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !isOpen;
-    this.#drawn = picture;
+  isDue(isOpen: boolean, image: SampledFrame): boolean {
+    const hasRoom = this.#capacity.visible >= this.#bounds.max.visible && !isOpen;
+    this.#drawn = image;
     this.#frame++;
     const isInTurn =
       this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
     const now = performance.now();
-    const isDue = isInTurn || !isAlike(picture, this.#picture) || now - this.#sampledAt > LONGEST_PAUSE_MS;
+    const isDue = isInTurn || !isAlike(image, this.#image) || now - this.#sampledAt > LONGEST_PAUSE_MS;
     if (!isDue || hasRoom || this.#isReading) return false;
-    this.#picture = picture;
+    this.#image = image;
     this.#sampledAt = now;
     return true;
   }
@@ -179,7 +179,7 @@ export class CapacityMonitor {
           return undefined;
         }
         const used = { visible: visible + hidden, pairs: pairs + lostPairs };
-        this.judge(used, hidden + lostPairs > 0, this.#picture);
+        this.judge(used, hidden + lostPairs > 0, this.#image);
         return { visible, pairs, covered };
       },
       () => undefined,
@@ -195,14 +195,14 @@ export class CapacityMonitor {
    * Evaluates the need of a sampled frame.
    * @param picture The sampled frame.
    */
-  judge(used: Capacity, overflowed: boolean, picture = this.#drawn): void {
-    this.#memory.note({ ...picture, used, at: performance.now() });
+  judge(used: Capacity, overflowed: boolean, image = this.#drawn): void {
+    this.#memory.note({ ...image, used, at: performance.now() });
     // The frame at rest is shown before any measurement of it.
-    const need = this.#memory.wholeNeedBy({ ...picture, used });
-    const least = this.#bounds.least();
+    const need = this.#memory.wholeNeedBy({ ...image, used });
+    const min = this.#bounds.min();
     const grown = {
-      visible: Math.max(least.visible, grow(need.visible, this.#capacity.visible, this.#bounds.most.visible)),
-      pairs: Math.max(least.pairs, grow(need.pairs, this.#capacity.pairs, this.#bounds.most.pairs)),
+      visible: Math.max(min.visible, grow(need.visible, this.#capacity.visible, this.#bounds.max.visible)),
+      pairs: Math.max(min.pairs, grow(need.pairs, this.#capacity.pairs, this.#bounds.max.pairs)),
     };
     if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
       this.#memory.grow();
@@ -215,12 +215,12 @@ export class CapacityMonitor {
     };
     if (++this.#idleSamples < this.#memory.looks) return;
     // Estimates are low if the camera came closer meanwhile.
-    const whole = this.#memory.wholeNeed(picture.wholePixels);
+    const whole = this.#memory.wholeNeed(image.wholePixels);
     const shrunk = {
-      visible: shrink(Math.max(whole.visible, this.#recent.visible), this.#capacity.visible, least.visible),
-      pairs: shrink(Math.max(whole.pairs, this.#recent.pairs), this.#capacity.pairs, least.pairs),
+      visible: shrink(Math.max(whole.visible, this.#recent.visible), this.#capacity.visible, min.visible),
+      pairs: shrink(Math.max(whole.pairs, this.#recent.pairs), this.#capacity.pairs, min.pairs),
     };
-    if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) {
+    if (bytesOf(this.#capacity) - bytesOf(shrunk) >= MIN_SAVING) {
       this.#memory.shrink();
       this.#resize(shrunk, false);
     }
@@ -236,10 +236,10 @@ export class CapacityMonitor {
 
 const isAlike = (a: SampledFrame, b: SampledFrame): boolean => a.pixels === b.pixels && a.isWhole === b.isWhole;
 
-const grow = (used: number, room: number, most: number): number =>
-  used > FULL * room ? Math.max(room, Math.min(most, Math.ceil(used * HEADROOM))) : room;
+const grow = (used: number, room: number, max: number): number =>
+  used > FULL * room ? Math.max(room, Math.min(max, Math.ceil(used * HEADROOM))) : room;
 
-const shrink = (used: number, room: number, least: number): number =>
-  used < SLACK * room ? Math.max(least, Math.ceil(used * HEADROOM)) : room;
+const shrink = (used: number, room: number, min: number): number =>
+  used < SLACK * room ? Math.max(min, Math.ceil(used * HEADROOM)) : room;
 
 const bytesOf = ({ visible, pairs }: Capacity): number => BYTES_PER_VISIBLE * visible + BYTES_PER_PAIR * pairs;

@@ -10,9 +10,14 @@ import { requireAuxiliary, requireFrameTarget, requireTarget, requireTextureSize
 export { renderSettingsOf as settingsOf } from './render-settings.js';
 
 /** @throws GaussianSplatError for arguments with which no frame can be drawn, before settings are read. */
-export function checkArguments(device: GPUDevice, camera: Camera, picture: FrameTarget, settings: FrameSettings): void {
+export function checkArguments(
+  device: GPUDevice,
+  camera: Camera,
+  frameTarget: FrameTarget,
+  settings: FrameSettings,
+): void {
   requireTextureSize(device, camera);
-  requireFrameTarget(picture, settings);
+  requireFrameTarget(frameTarget, settings);
 }
 
 /** @throws GaussianSplatError for a frame that cannot be drawn. */

@@ -121,5 +121,5 @@ function readAnswers(found: ArrayBuffer, points: number, splatOf: (stored: numbe
 }
 
 /** WGSL compilers may assume that there are no infinities. */
-const LARGEST_FLOAT32 = 3.4e38;
-const finite = (value: number): number => Math.min(LARGEST_FLOAT32, Math.max(-LARGEST_FLOAT32, value));
+const MAX_FLOAT32 = 3.4e38;
+const finite = (value: number): number => Math.min(MAX_FLOAT32, Math.max(-MAX_FLOAT32, value));

@@ -1,7 +1,7 @@
 import { boundsOf, GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianLayout } from '@gaussian-splat/core/contract';
 import { pageCapacity } from './gaussian-buffers.js';
-import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
 import * as layouts from './generated/live-layouts.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
@@ -37,7 +37,7 @@ export interface RowSample {
 }
 
 /** A block with its resources for filling. */
-interface DynamicPage extends GaussianPage {
+interface DynamicPage extends GaussianBlock {
   /** Index of its first row among all rows. */
   readonly first: number;
   /** `Ingest` of shaders/ingest.wgsl. */

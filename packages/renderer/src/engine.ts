@@ -57,7 +57,7 @@ export class Engine {
    */
   accumulationOf(
     { width, height }: Pick<Camera, 'width' | 'height'>,
-    most: number,
+    max: number,
     bind: (accumulated: GPUTextureView) => ComposeBindings,
   ): Accumulation {
     const all = this.#accumulations;
@@ -66,7 +66,7 @@ export class Engine {
     all.delete(key);
     if (!found) {
       for (const [old, { texture }] of all) {
-        if (all.size < most) break;
+        if (all.size < max) break;
         texture.destroy();
         all.delete(old);
       }

@@ -1,7 +1,7 @@
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityHistory, type Capacity } from './capacity-history.js';
-import { CapacityMonitor, CountBuffers, initialCapacity, LEAST_CAPACITY } from './capacity.js';
-import { PageTable } from './page-table.js';
+import { CapacityMonitor, CountBuffers, initialCapacity, MIN_CAPACITY } from './capacity.js';
+import { BlockTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
@@ -10,13 +10,13 @@ import type { World } from './world.js';
 /** Capacity in pairs with which the pacer can measure their cost. */
 const TELLING_ROOM = 1 << 18;
 /** Minimum usage of the capacity after scenes are removed; below it the capacity is released. */
-const LEAST_USED = 0.5;
+const MIN_USED = 0.5;
 /** Every frame may be divided into this many submissions: each takes the main thread a few tenths of a millisecond. */
 const FEW_SUBMISSIONS = 4;
 
 /** GPU resources between the stages for a set of scenes. */
 export interface Resources {
-  readonly table: PageTable;
+  readonly table: BlockTable;
   readonly scratch: Scratch;
   readonly bindings: FrameBindings;
   readonly monitor: CapacityMonitor;
@@ -44,7 +44,7 @@ export class FrameResources {
   #boundPlan: GPUBuffer | undefined;
   #hasQuickPairs = false;
   /** Largest splat budget of any frame. */
-  #mostSplats: number | undefined;
+  #maxSplats: number | undefined;
 
   constructor(device: GPUDevice, options: ResourceOptions) {
     this.#device = device;
@@ -78,25 +78,25 @@ export class FrameResources {
       const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
       return hasOtherRoom ? this.#rebind(current.table) : current;
     }
-    if (current) return this.#layAnew(current);
-    const table = new PageTable(this.#device, world);
+    if (current) return this.#layoutAgain(current);
+    const table = new BlockTable(this.#device, world);
     this.#capacity = this.#firstFor(table);
     this.#memory = new CapacityHistory();
     return this.#rebind(table);
   }
 
   /** The set of scenes has changed: buffers that are large enough stay, the others grow by the size of the new scenes. */
-  #layAnew({ table }: Resources): Resources {
+  #layoutAgain({ table }: Resources): Resources {
     const before = table.splats;
     table.lay();
-    const [now, most, first] = [this.#capacity!, this.#mostFor(table), this.#firstFor(table)];
+    const [now, max, first] = [this.#capacity!, this.#maxFor(table), this.#firstFor(table)];
     const added = table.splats - before;
     const visible =
       added > 0
-        ? this.#visibleWith(initialCapacity(added, most, this.#isBudgeted(table)).visible, most)
+        ? this.#visibleWith(initialCapacity(added, max, this.#isBudgeted(table)).visible, max)
         : Math.min(now.visible, first.visible);
     const pairs = added > 0 ? Math.max(now.pairs, first.pairs) : Math.min(now.pairs, first.pairs);
-    const isEnough = (own: number, wanted: number): boolean => wanted <= own && wanted >= own * LEAST_USED;
+    const isEnough = (own: number, wanted: number): boolean => wanted <= own && wanted >= own * MIN_USED;
     this.#capacity = {
       visible: isEnough(now.visible, visible) ? now.visible : visible,
       pairs: isEnough(now.pairs, pairs) ? now.pairs : pairs,
@@ -107,11 +107,11 @@ export class FrameResources {
   }
 
   /** Capacity in visible splats if `coming` more may become visible, including unused capacity. */
-  #visibleWith(coming: number, most: Capacity): number {
+  #visibleWith(coming: number, max: Capacity): number {
     const { visible } = this.#capacity!;
     const { lastNeed } = this.#memory;
     if (lastNeed && lastNeed.visible + coming <= visible) return visible;
-    return Math.min(most.visible, visible + coming);
+    return Math.min(max.visible, visible + coming);
   }
 
   /** Frees everything. */
@@ -128,22 +128,22 @@ export class FrameResources {
 
   /** A larger splat budget than before requires another capacity. */
   #roomFor(splatBudget: number): void {
-    const most = splatBudget > 0 ? splatBudget : Infinity;
-    if (this.#mostSplats !== undefined && most > this.#mostSplats) this.release();
-    this.#mostSplats = Math.max(this.#mostSplats ?? 0, most);
+    const max = splatBudget > 0 ? splatBudget : Infinity;
+    if (this.#maxSplats !== undefined && max > this.#maxSplats) this.release();
+    this.#maxSplats = Math.max(this.#maxSplats ?? 0, max);
   }
 
-  #mostFor(table: PageTable): Capacity {
-    const budget = table.hasDetail ? (this.#mostSplats ?? Infinity) : Infinity;
+  #maxFor(table: BlockTable): Capacity {
+    const budget = table.hasDetail ? (this.#maxSplats ?? Infinity) : Infinity;
     return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
   }
 
-  #firstFor(table: PageTable): Capacity {
-    return initialCapacity(table.splats, this.#mostFor(table), this.#isBudgeted(table));
+  #firstFor(table: BlockTable): Capacity {
+    return initialCapacity(table.splats, this.#maxFor(table), this.#isBudgeted(table));
   }
 
-  #isBudgeted(table: PageTable): boolean {
-    return table.isStreamed && Number.isFinite(this.#mostSplats);
+  #isBudgeted(table: BlockTable): boolean {
+    return table.isStreamed && Number.isFinite(this.#maxSplats);
   }
 
   /**
@@ -151,8 +151,8 @@ export class FrameResources {
    * scene within a frame. It keeps the capacity for pairs, which determines the number of submissions, once a few
    * submissions are known to be enough.
    */
-  #leastFor(table: PageTable): Capacity {
-    if (!this.#isBudgeted(table)) return LEAST_CAPACITY;
+  #minFor(table: BlockTable): Capacity {
+    if (!this.#isBudgeted(table)) return MIN_CAPACITY;
     const { visible, pairs } = this.#firstFor(table);
     // Never reset, because an alternating capacity would be reallocated each time.
     this.#hasQuickPairs ||= FEW_SUBMISSIONS * this.#options.pairsAtOnce() >= pairs;
@@ -160,7 +160,7 @@ export class FrameResources {
   }
 
   /** Allocates and binds the buffers between the stages, for the current capacity. */
-  #rebind(table: PageTable): Resources {
+  #rebind(table: BlockTable): Resources {
     const { stages } = this.#options;
     const capacity = this.#capacity!;
     const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
@@ -192,8 +192,8 @@ export class FrameResources {
     });
   }
 
-  #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
-    const bounds = { least: () => this.#leastFor(table), most: this.#mostFor(table) };
+  #watch(table: BlockTable, capacity: Capacity): CapacityMonitor {
+    const bounds = { min: () => this.#minFor(table), max: this.#maxFor(table) };
     this.#current?.monitor.destroy();
     this.#counts ??= new CountBuffers(this.#device);
     return new CapacityMonitor(this.#counts, capacity, bounds, this.#memory, (requested, overflowed) => {

@@ -24,7 +24,7 @@ export interface Target extends Surface {
 }
 
 /** Composes accumulated splats over the background, instead of the viewpoint's default: see {@link LinearColors}. */
-export interface Composer {
+export interface Compositor {
   compose(
     encoder: GPUCommandEncoder,
     resources: Readonly<Record<'compose' | 'accumulated', Resource>>,
@@ -45,7 +45,7 @@ export interface FrameTarget {
   /**
    * Color conversion: a {@link LinearColors} for targets of linear light. Default: sRGB-encoded, as scenes are trained.
    */
-  readonly colours?: Composer | undefined;
+  readonly colors?: Compositor | undefined;
   /** Depth of the meshes in the frame, and the destination of the splats' depth: a {@link SceneDepth}. */
   readonly depth?: PaintingDepth | undefined;
   /** Low-pass filter of all scenes of the frame. Default: that of the training of each scene, if its file states it. */

@@ -1,5 +1,5 @@
 import { loadModule, type ShDegree, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
@@ -37,7 +37,7 @@ export class GaussianBuffers implements GaussianScene {
   readonly leafCount: number | undefined;
   /** Splats of the source that were dropped because of an unusable value. */
   readonly droppedCount: number;
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly version = 0;
   /** Only with levels of detail. */
   readonly detailBudget: DetailBudget | undefined;
@@ -175,11 +175,11 @@ export function sceneBytes({ count, shDegree, shPrecision, details }: SceneSize)
   return 4 * (words * count + perChunk * Math.ceil(count / constants.CULL_GROUP));
 }
 
-function makePages(device: GPUDevice, packed: SceneSize, memory: GpuMemory): GaussianPage[] {
+function makePages(device: GPUDevice, packed: SceneSize, memory: GpuMemory): GaussianBlock[] {
   const shStride = shWords(packed.shDegree, packed.shPrecision);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
-  const pages: GaussianPage[] = [];
+  const pages: GaussianBlock[] = [];
   for (let left = packed.count; left > 0; left -= capacity) {
     const count = Math.min(capacity, left);
     const chunks = Math.ceil(count / constants.CULL_GROUP);

@@ -6,7 +6,7 @@ import type { DetailBudget } from './stages/detail-budget.js';
 import type { ShPrecision } from './pack/words.js';
 
 /** Gaussians in the largest buffers that a shader can bind on the device. */
-export interface GaussianPage {
+export interface GaussianBlock {
   readonly count: number;
   /** array<PackedGaussian>, unless {@link reading} says otherwise */
   readonly geometry: GPUBuffer;
@@ -59,7 +59,7 @@ export interface GaussianScene {
   readonly filterVariance?: number | undefined;
   /** World position, in float64, of the origin of the positions on the GPU. */
   readonly origin: Vector3;
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   /**
    * Only for a scene with levels of detail: keeps its frames within `RenderSettings.splatBudget`. Such scenes provide
    * it, so that it is loaded only with them.

@@ -1,23 +1,23 @@
 export { capture, type CaptureRequest } from './capture.js';
-export { autotune, startVariants, type AutotuneOptions, type StartOptions } from './autotune/autotune.js';
+export { autotune, pickInitialVariants, type AutotuneOptions, type StartOptions } from './autotune/autotune.js';
 export type { AutotuneStore } from './autotune/store.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianScene } from './gaussian-scene.js';
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { QUALITIES, type PerFrameSettings, type RenderSettings, type Quality } from './render-settings.js';
-export { LinearColours } from './linear-colours.js';
+export { LinearColors } from './linear-colors.js';
 export { DetailedGaussians } from './levels/detailed-gaussians.js';
 export { StreamedGaussians, type PoolOptions, type StreamOptions } from './streaming/streamed-gaussians.js';
 export type { FetchPage, PageSource, StreamedScene } from './streaming/page-source.js';
 export { checkManifest, type DetailManifest } from './streaming/manifest.js';
 export { packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export type { AccumulationFormat, AuxiliaryFrame, RasterizerName } from './rasterizers/rasterizer.js';
-export { FilteredFrame, type ModelImage } from './pictures/filtered-frame.js';
-export { ImageTensor, type ImageFit, type ImageShape } from './pictures/picture-tensor.js';
+export { FilteredFrame, type ModelImage } from './images/filtered-frame.js';
+export { ImageTensor, type ImageFit, type ImageShape } from './images/image-tensor.js';
 export {
   settings,
-  type Composer,
+  type Compositor,
   type FrameSettings,
   type FrameTarget,
   type Rgba,

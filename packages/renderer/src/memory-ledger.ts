@@ -60,7 +60,7 @@ export class MemoryLedger {
    * @param most Upper limit of this reservation, besides the rest of the budget; default no limit.
    * @throws GaussianSplatError `out-of-memory/budget` if either limit is exceeded.
    */
-  reserve(label: string, bytes: number, most = Infinity): Reservation {
+  reserve(label: string, bytes: number, max = Infinity): Reservation {
     if (!(bytes >= 0))
       throw new GaussianSplatError('argument/value', {
         where: label,
@@ -68,7 +68,7 @@ export class MemoryLedger {
         found: String(bytes),
         remedy: 'hand over the bytes that will be allocated',
       });
-    if (bytes > most) throw overBudget(label, bytes, `${inBytes(most)}, the memoryBudget that was given`);
+    if (bytes > max) throw overBudget(label, bytes, `${inBytes(max)}, the memoryBudget that was given`);
     for (const [giveBack, unseen] of this.releasable) {
       const isScarce = bytes > this.budgetBytes - this.bytes;
       if (isScarce || (unseen && this.#unseen > this.unseenBytes)) giveBack();
@@ -90,10 +90,10 @@ const LEDGERS = new WeakMap<object, MemoryLedger>();
 
 const inBytes = (value: number): string => `${Math.floor(value)} bytes (${(value / 1e6).toFixed(1)} MB)`;
 
-function overBudget(label: string, bytes: number, most: string): GaussianSplatError {
+function overBudget(label: string, bytes: number, max: string): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/budget', {
     where: label,
-    expected: `at most ${most}`,
+    expected: `at most ${max}`,
     found: inBytes(bytes),
     remedy:
       'show a smaller scene (gaussian-splat economise makes one), remove others, or raise the budget (memoryBudget)',

@@ -24,8 +24,8 @@ export class OverdrawLimit {
     return splats > FREE_FRAMES;
   }
 
-  /** `View.most_covered` of the next frame. */
-  mostFor(splats: number): number {
+  /** `View.max_covered` of the next frame. */
+  maxFor(splats: number): number {
     return Math.min(NO_LIMIT, Math.floor((constants.COVERED_UNIT * allowedFor(splats)) / this.share));
   }
 
@@ -36,9 +36,9 @@ export class OverdrawLimit {
    */
   note(covered: number, splats: number): boolean {
     const before = this.share;
-    const most = allowedFor(splats) / covered;
+    const max = allowedFor(splats) / covered;
     // Hysteresis: at rest the same view never alternates.
-    if (most < before || most > MARGIN * MARGIN * before) this.share = Math.min(1, most / MARGIN);
+    if (max < before || max > MARGIN * MARGIN * before) this.share = Math.min(1, max / MARGIN);
     return this.share !== before;
   }
 }

@@ -1,5 +1,5 @@
 import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage, PageRequests } from './gaussian-scene.js';
+import type { GaussianBlock, PageRequests } from './gaussian-scene.js';
 import type { GeometryReading } from './geometry-reading.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
@@ -29,8 +29,8 @@ const OPAQUE_DEPTH = -Math.log(1e-4);
 export const opticalFactor = (opacity: number): number => Math.min(1, -Math.log(1 - opacity) / OPAQUE_DEPTH);
 
 /** The blocks of the visible scenes of a world, with a `View` uniform for each. */
-export class PageTable {
-  #pages: readonly GaussianPage[] = [];
+export class BlockTable {
+  #pages: readonly GaussianBlock[] = [];
   #firstGroups: Uint32Array = new Uint32Array(1);
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
@@ -68,7 +68,7 @@ export class PageTable {
     this.#uniforms = this.#memory.buffer('gs.views', bytes, uniform | copyDestination);
   }
 
-  get pages(): readonly GaussianPage[] {
+  get pages(): readonly GaussianBlock[] {
     return this.#pages;
   }
 
@@ -153,14 +153,14 @@ export class PageTable {
    * Writes the camera uniforms of all blocks, for subsequent submissions.
    * @param pixelArea Area of a pixel of the displayed frame, in pixels of the camera.
    * @param filter Overrides that of the scenes.
-   * @param mostCovered `View.most_covered`; undefined for no limit.
+   * @param maxCovered `View.max_covered`; undefined for no limit.
    */
   look(
     camera: Camera,
     pixelArea: number,
     { shDegree, depthKeyBits, order, detail, detailFade, splatBudget }: RenderSettings,
     filter?: SplatFilter,
-    mostCovered?: number,
+    maxCovered?: number,
   ): void {
     const shared = {
       sh_cap: shDegree,
@@ -169,7 +169,7 @@ export class PageTable {
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
-      ...(mostCovered !== undefined && { most_covered: mostCovered }),
+      ...(maxCovered !== undefined && { max_covered: maxCovered }),
     };
     let page = 0;
     for (const { scene, sceneToWorld, opacity, crop = EVERYWHERE } of this.#placements) {
@@ -205,7 +205,7 @@ export class PageTable {
 const relative = (corner: Vector3, origin: Vector3): number[] =>
   corner.map((value, axis) => Math.min(MAX_FLOAT32, Math.max(-MAX_FLOAT32, value - origin[axis])));
 
-function firstGroups(pages: readonly GaussianPage[]): Uint32Array {
+function firstGroups(pages: readonly GaussianBlock[]): Uint32Array {
   const first = new Uint32Array(pages.length + 1);
   pages.forEach(({ count }, i) => (first[i + 1] = first[i] + cullGroups(count)));
   return first;

@@ -1,5 +1,5 @@
 import { constants } from './generated/shaders.js';
-import type { GaussianPage } from './gaussian-scene.js';
+import type { GaussianBlock } from './gaussian-scene.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GEOMETRY_WORDS } from './pack/words.js';
 
@@ -20,7 +20,7 @@ export interface Samples {
 }
 
 /** Reads evenly spaced runs of splats over the blocks back from the GPU; splats of opacity 0 are skipped. */
-export async function readSamples(device: GPUDevice, pages: readonly GaussianPage[]): Promise<Samples> {
+export async function readSamples(device: GPUDevice, pages: readonly GaussianBlock[]): Promise<Samples> {
   const runs = pages.flatMap(({ geometry, count }) =>
     Array.from({ length: Math.ceil(count / CULL_GROUP) }, (_, run) => ({
       geometry,

@@ -116,7 +116,7 @@ export type PerFrameSettings = Pick<
   'depthKeyBits' | 'transmittanceMin' | 'order' | 'orderWindow' | 'shDegree' | 'detail' | 'resolutionScale'
 >;
 
-const RANGES: Readonly<Partial<Record<keyof RenderSettings, readonly [least: number, most: number]>>> = {
+const RANGES: Readonly<Partial<Record<keyof RenderSettings, readonly [min: number, max: number]>>> = {
   submissions: [1, 256],
   transmittanceMin: [0, 1],
   detail: [0, 64],

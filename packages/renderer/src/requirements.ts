@@ -89,13 +89,13 @@ export function requireBlendable(device: GPUDevice, format: AccumulationFormat):
 }
 
 /** Checks the types of a frame target. @throws GaussianSplatError `argument/value` */
-export function requireFrameTarget({ target, over, colours }: Partial<FrameTarget>, settings: FrameSettings): void {
+export function requireFrameTarget({ target, over, colors }: Partial<FrameTarget>, settings: FrameSettings): void {
   if (!isObject(target)) throw missing('target', 'a texture, or { view, format } of one', target);
   if (!('createView' in target) && (typeof target.format !== 'string' || !isObject(target.view)))
     throw missing('target', 'a texture, or a view of one with its format: { view, format }', JSON.stringify(target));
   if (!isObject(settings)) throw missing('settings', 'settings(…), or undefined', settings);
-  if (over === 'target' && !colours && formatOf(target).endsWith('-srgb'))
-    throw missing('colours', 'new LinearColours(device), to blend with what a target of linear light holds', colours);
+  if (over === 'target' && !colors && formatOf(target).endsWith('-srgb'))
+    throw missing('colors', 'new LinearColors(device), to blend with what a target of linear light holds', colors);
   if (over === undefined || over === 'target') return;
   if (over?.length !== 4 || !Array.prototype.every.call(over, Number.isFinite))
     throw missing('over', "'target', or four finite numbers: premultiplied red, green, blue and alpha", over);

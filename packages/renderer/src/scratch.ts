@@ -1,7 +1,7 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import type { PageTable } from './page-table.js';
+import type { BlockTable } from './page-table.js';
 import { scanBytes } from './stages/stage.js';
 
 /** Required capacities of the buffers between the stages. */
@@ -119,7 +119,7 @@ export class Scratch {
   }
 
   /** Writes the range of groups of each block for the stages. */
-  lay({ pages, firstGroups, groups }: Pick<PageTable, 'pages' | 'firstGroups' | 'groups'>): void {
+  lay({ pages, firstGroups, groups }: Pick<BlockTable, 'pages' | 'firstGroups' | 'groups'>): void {
     const ranges = pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]);
     this.#device.queue.writeBuffer(this.pageRanges, 0, Uint32Array.from(ranges));
     this.#device.queue.writeBuffer(this.limits, 0, Uint32Array.of(pages.length, this.capacity, groups));

@@ -1,6 +1,6 @@
 import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
-import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import type { GaussianBlock, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { type PackedGaussians } from './pack/pack.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './pack/words.js';
@@ -65,7 +65,7 @@ export class SequenceGaussians implements GaussianScene {
     return this.#frame.origin;
   }
 
-  get pages(): readonly GaussianPage[] {
+  get pages(): readonly GaussianBlock[] {
     return this.#buffers.pages;
   }
 

@@ -1,5 +1,5 @@
 /** The individual stages, for tests and for custom pipelines. */
-export { CapacityMonitor, CountBuffers, LEAST_CAPACITY } from './capacity.js';
+export { CapacityMonitor, CountBuffers, MIN_CAPACITY } from './capacity.js';
 export { CapacityHistory, type Capacity, type SampledFrame } from './capacity-history.js';
 export { passesSelfTest, packSpheres, sphereCloud } from './autotune/self-test.js';
 export { ROUNDS } from './autotune/search.js';
@@ -29,13 +29,13 @@ export { pageLayout, SLOT_CHUNKS } from './streaming/manifest.js';
 export { packQuantizedChunk, QUANTIZED_CHUNK_WORDS } from './streaming/quantized-geometry.js';
 export { QUANTIZED } from './streaming/quantized-reading.js';
 export { PagePool, poolBytes, poolSize } from './streaming/page-pool.js';
-export { MOST_FETCHES, MOST_UNDER_WAY, PageStreamer } from './streaming/page-streamer.js';
+export { MAX_FETCHES, MAX_IN_FLIGHT, PageStreamer } from './streaming/page-streamer.js';
 export { folderSource } from './streaming/page-source.js';
 export { Residency } from './streaming/residency.js';
-export { MOST_UPLOAD_BYTES, UPLOAD_SHARE, UploadBudget } from './streaming/upload-budget.js';
+export { MAX_UPLOAD_BYTES, UPLOAD_SHARE, UploadBudget } from './streaming/upload-budget.js';
 export { halfBits } from './pack/half.js';
 export { isOfPlanes, mortonOrder } from './pack/morton.js';
-export { recentred } from './pack/recentre.js';
+export { recentered } from './pack/recenter.js';
 export { SH_PRECISION, shWords } from './pack/words.js';
 export { Scratch } from './scratch.js';
 export { ComposeStage } from './stages/compose.js';

@@ -16,7 +16,7 @@ const TELLING_PAIRS = 1 << 16;
  */
 const MEMORY = 0.5;
 /** Maximum number of submissions, because each has its own cost. */
-const MOST = 256;
+const MAX_SUBMITTED = 256;
 
 /** Cost of rasterization on one device, shared by all renderers. */
 class DeviceCost {
@@ -40,7 +40,7 @@ export class SubmissionPacer {
 
   /** Number of submissions for a frame with at most this many pairs of splat and bin: 1 to 256, and 1 for fast frames. */
   partsFor(pairs: number): number {
-    return Math.min(MOST, Math.max(1, Math.ceil((pairs * this.#cost.perPair) / BUDGET_MS)));
+    return Math.min(MAX_SUBMITTED, Math.max(1, Math.ceil((pairs * this.#cost.perPair) / BUDGET_MS)));
   }
 
   /** Maximum number of pairs for a single submission. */

@@ -51,8 +51,8 @@ export class TensorBindings {
     if (rows === 0) return;
     const all = (instance + 1) * rows;
     for (const { tensor, rowStride } of this.#layout.attributes) {
-      const least = Math.ceil((all * rowStride * this.#elementBytes) / 4) * 4;
-      requireBytes(tensor, tensors[tensor], least);
+      const min = Math.ceil((all * rowStride * this.#elementBytes) / 4) * 4;
+      requireBytes(tensor, tensors[tensor], min);
     }
     if (this.#layout.count !== undefined)
       requireBytes(this.#layout.count, tensors[this.#layout.count], countBytes(this.#layout) * (instance + 1));
@@ -173,11 +173,11 @@ function colorKind(slice: AttributeSlice | undefined): number {
   return slice.shOrder === 'channel-major' ? constants.COLOR_CHANNEL_MAJOR : constants.COLOR_COEFFICIENT_MAJOR;
 }
 
-function requireBytes(name: string, buffer: GPUBuffer | undefined, least: number): void {
-  if (buffer !== undefined && buffer.size >= least) return;
+function requireBytes(name: string, buffer: GPUBuffer | undefined, min: number): void {
+  if (buffer !== undefined && buffer.size >= min) return;
   throw new GaussianSplatError('argument/value', {
     where: `tensor ${name}`,
-    expected: `a storage buffer of at least ${least} bytes`,
+    expected: `a storage buffer of at least ${min} bytes`,
     found: buffer === undefined ? 'none' : `${buffer.size} bytes`,
     remedy: 'pass the buffers that the run wrote, and the number of rows that it wrote',
   });

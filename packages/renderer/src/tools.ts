@@ -19,7 +19,7 @@ export { CHUNK_NUMBERS } from './pack/words.js';
 export { isOfPlanes, sampleAxis } from './pack/morton.js';
 export { AuxiliaryOutputs } from './rasterizers/auxiliary-outputs.js';
 export { packedOrder } from './pack/pack.js';
-export { recentred } from './pack/recentre.js';
+export { recentered } from './pack/recenter.js';
 export { type ShPrecision } from './pack/words.js';
 export { choosePrecision, noiseIn, SCALE_BIAS, SCALE_STEPS } from './pack/sh.js';
 export { shReader } from './pack/unpack.js';
@@ -42,12 +42,12 @@ export {
 } from './streaming/quantized-geometry.js';
 export { type ProbeAnswer, type ProbePoint } from './depth-probe.js';
 export { type ProbedSplat } from './probed-splat.js';
-export { type GaussianPage, type PageRequests } from './gaussian-scene.js';
+export { type GaussianBlock, type PageRequests } from './gaussian-scene.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { buildPackedLevels, packWithDetail, type PackedLevels } from './levels/packed-levels.js';
 export { packLevelRuns } from './streaming/pack-runs.js';
-export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
+export { layoutLevels, type LevelBox, type LevelPage, type LevelScene } from './streaming/level-pages.js';
 export { levelSource, packLevelPage } from './streaming/level-source.js';
 export { turn } from './gpu/page-thread.js';
 export { readPacked } from './pack/packed-scene.js';
@@ -59,14 +59,14 @@ export { bytesPerSplat, type Reservation } from './memory-ledger.js';
 export {
   JoinedBlocks,
   layoutOf,
-  packShare,
-  SHARE_SPLATS,
+  packShard,
+  SHARD_SPLATS,
   ShareCells,
   sortBlock,
-  type PackedShare,
+  type PackedShard,
   type ShareBlock,
   type ShareCell,
-  type ShareFacts,
+  type ShardInfo,
   type ShareLayout,
   type SortedBlock,
 } from './pack/shares.js';

@@ -49,7 +49,7 @@ export function cameraValues(camera: Camera, origin: Vector3, variance: number =
   const marginY = (CLAMP_MARGIN * 0.5 * height) / fy;
   const eye = subtract(eyeOf(worldToCamera), origin);
   return {
-    most_covered: NO_LIMIT,
+    max_covered: NO_LIMIT,
     local_to_camera: columns,
     eye,
     eye_rest: subtract(eye, [Math.fround(eye[0]), Math.fround(eye[1]), Math.fround(eye[2])]),

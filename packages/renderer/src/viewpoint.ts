@@ -28,7 +28,7 @@ import type { World } from './world.js';
 /** One of several views: see {@link Viewpoint.drawAll}. */
 export interface View {
   readonly camera: Camera;
-  readonly picture: FrameTarget;
+  readonly target: FrameTarget;
 }
 
 /** Number of submissions of a frame, and the watch that times them. */
@@ -39,7 +39,7 @@ interface Submissions {
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
 /** View of a target: a render attachment has one level and one layer. */
-const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
+const ONE_IMAGE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
 
 /** Options of a {@link Viewpoint}. */
 export interface ViewpointOptions {
@@ -99,7 +99,7 @@ export class Viewpoint {
   readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
   #settings: FrameSettings;
   #engine: Engine;
-  #mostSizes = 1;
+  #maxSizes = 1;
   /** Auxiliary outputs of the last frame that had any. */
   #auxiliary: AuxiliaryTilePainter | undefined;
   /** Whether the code for the last frame's order was still loading. */
@@ -188,10 +188,10 @@ export class Viewpoint {
    * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for another argument;
    * `out-of-memory/buffer-limit` if the scenes need a larger buffer than the device allows.
    */
-  draw(camera: Camera, picture: FrameTarget, settings: FrameSettings = this.#settings): void {
-    const { timer } = picture;
+  draw(camera: Camera, frameTarget: FrameTarget, settings: FrameSettings = this.#settings): void {
+    const { timer } = frameTarget;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const encoded = this.#encode(encoder, camera, picture, settings, true);
+    const encoded = this.#encode(encoder, camera, frameTarget, settings, true);
     const { last, isWatched, submissions, requests, resources } = encoded;
     timer?.endFrame?.(last);
     for (const request of requests) request.copy(last);
@@ -213,8 +213,8 @@ export class Viewpoint {
    * @throws GaussianSplatError as {@link draw} does.
    */
   drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
-    this.#mostSizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`)).size || 1;
-    for (const { camera, picture } of views) this.draw(camera, picture, settings);
+    this.#maxSizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`)).size || 1;
+    for (const { camera, target } of views) this.draw(camera, target, settings);
   }
 
   /**
@@ -224,8 +224,8 @@ export class Viewpoint {
    * frame, are ignored.
    * @throws GaussianSplatError as {@link draw} does.
    */
-  record(encoder: GPUCommandEncoder, camera: Camera, picture: FrameTarget, settings = this.#settings): void {
-    const encoded = this.#encode(encoder, camera, { ...picture, timer: undefined }, settings, false);
+  record(encoder: GPUCommandEncoder, camera: Camera, frameTarget: FrameTarget, settings = this.#settings): void {
+    const encoded = this.#encode(encoder, camera, { ...frameTarget, timer: undefined }, settings, false);
     if (encoded.isWatched || encoded.requests.length > 0) setTimeout(() => this.#readLater(encoded));
   }
 
@@ -233,16 +233,16 @@ export class Viewpoint {
   #encode(
     encoder: GPUCommandEncoder,
     camera: Camera,
-    picture: FrameTarget,
+    frameTarget: FrameTarget,
     settings: FrameSettings,
     mayDivide: boolean,
   ): Encoded {
-    const { auxiliary, timer, depth } = picture;
+    const { auxiliary, timer, depth } = frameTarget;
     validateCamera(camera);
-    checkArguments(this.#device, camera, picture, settings);
+    checkArguments(this.#device, camera, frameTarget, settings);
     const asked = this.#resolve(settings);
-    checkFrame(camera, picture, asked);
-    const target = this.#targetOf(picture, camera);
+    checkFrame(camera, frameTarget, asked);
+    const target = this.#targetOf(frameTarget, camera);
     const order = this.#orderOf(asked);
     this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first hidden splat.
@@ -258,7 +258,7 @@ export class Viewpoint {
     table.update();
     timer?.startFrame();
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, resolved, picture.filter, this.#overdraw?.mostFor(table.splats));
+    table.look(drawn, pixelArea, resolved, frameTarget.filter, this.#overdraw?.maxFor(table.splats));
     const requests = recordProjection(encoder, {
       stages,
       bindings,
@@ -281,8 +281,8 @@ export class Viewpoint {
       },
     );
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
-    const how = { settings: resolved, timer, ...this.#wayToPaint(picture, resolved, drawn, scratch, order) };
-    const last = this.#paint(encoder, target, drawn, how, picture, submissions);
+    const how = { settings: resolved, timer, ...this.#wayToPaint(frameTarget, resolved, drawn, scratch, order) };
+    const last = this.#paint(encoder, target, drawn, how, frameTarget, submissions);
     this.#last = { stages, bindings, scale: drawn.width / camera.width };
     return { last, isWatched, submissions, requests, resources };
   }
@@ -387,13 +387,13 @@ export class Viewpoint {
     target: Target,
     camera: Camera,
     how: Pick<Painting, 'settings' | 'timer' | 'depth' | 'depths' | 'painter'>,
-    { over, colours }: FrameTarget,
+    { over, colors }: FrameTarget,
     submissions: Submissions,
   ): GPUCommandEncoder {
     const keeps = over === 'target';
     const background = keeps ? TRANSPARENT : (over ?? TRANSPARENT);
     const isFullSize = camera.width === target.width && camera.height === target.height;
-    const isStored = target.isStorable && !keeps && !colours && this.#engine.rasterizer.finishes(target.format);
+    const isStored = target.isStorable && !keeps && !colors && this.#engine.rasterizer.finishes(target.format);
     if (isFullSize && isStored) {
       return this.#recordParts(encoder, { ...how, surface: target, background }, submissions);
     }
@@ -405,7 +405,7 @@ export class Viewpoint {
     const { view, format } = texture;
     const surface = { view, format, width: camera.width, height: camera.height };
     const last = this.#recordParts(encoder, { ...how, surface }, submissions);
-    if (colours) colours.compose(last, compose.resources, target, keeps);
+    if (colors) colors.compose(last, compose.resources, target, keeps);
     else if (isStored) this.#compose.store(last, compose, target, how.timer);
     else this.#compose.draw(last, compose, target, how.timer, keeps);
     return last;
@@ -413,11 +413,11 @@ export class Viewpoint {
 
   /** Number of submissions of this frame: enough to keep each of them short. */
   #submissionsFor(isWatched: boolean): Submissions {
-    const least = Math.ceil(this.resolvedSettings.submissions);
-    if (this.#engine.rasterizer.pairPlan === undefined) return { parts: least };
+    const min = Math.ceil(this.resolvedSettings.submissions);
+    if (this.#engine.rasterizer.pairPlan === undefined) return { parts: min };
     const pairs = this.#engine.resources.pairCapacity;
     const watch = isWatched && this.#pacer.wantsToKnow(pairs) ? this.#pacer.watch() : undefined;
-    return { parts: Math.max(least, this.#pacer.partsFor(pairs)), watch };
+    return { parts: Math.max(min, this.#pacer.partsFor(pairs)), watch };
   }
 
   #submit(encoder: GPUCommandEncoder, { watch }: Submissions): void {
@@ -486,7 +486,7 @@ export class Viewpoint {
       return { view: target.view, format: target.format, isStorable: false, width, height };
     }
     let view = this.#views.get(target);
-    if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
+    if (view === undefined) this.#views.set(target, (view = target.createView(ONE_IMAGE)));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;
     return { view, texture: target, format: target.format, isStorable, width, height };
   }
@@ -496,7 +496,7 @@ export class Viewpoint {
     const share = this.resolvedSettings.resolutionScale;
     const width = Math.max(drawn.width, Math.round(target.width * share));
     const height = Math.max(drawn.height, Math.round(target.height * share));
-    return this.#engine.accumulationOf({ width, height }, this.#mostSizes, (accumulated) =>
+    return this.#engine.accumulationOf({ width, height }, this.#maxSizes, (accumulated) =>
       this.#compose.bind({ compose: this.#composeUniform, accumulated }),
     );
   }

@@ -4,7 +4,7 @@ import {
   registerSceneHost,
   type Camera as SplatCamera,
 } from '@gaussian-splat/core';
-import { LinearColours, SceneDepth, type FrameSettings } from '@gaussian-splat/renderer';
+import { LinearColors, SceneDepth, type FrameSettings } from '@gaussian-splat/renderer';
 import { texture, toneMapping, toneMappingExposure } from 'three/tsl';
 import {
   DepthTexture,
@@ -52,14 +52,14 @@ export class SplatRenderer {
   readonly #renderer: WebGPURenderer;
   readonly #device: GPUDevice;
   readonly #options: SplatRendererOptions;
-  readonly #colours: LinearColours;
+  readonly #colors: LinearColors;
   readonly #worlds = new Map<Object3D, Map<Camera, SplatWorld>>();
   readonly #depths = new WeakMap<GPUTexture, Map<boolean, SceneDepth>>();
   readonly #size = new Vector2();
   /** The meshes of a frame, and the splats unless there is tone mapping. */
-  #frame: Picture | undefined;
+  #frame: RenderImage | undefined;
   /** The meshes with tone mapping, and the splats. */
-  #mapped: { readonly picture: Picture; readonly map: Quad; readonly curve: ToneMapping } | undefined;
+  #mapped: { readonly image: RenderImage; readonly map: Quad; readonly curve: ToneMapping } | undefined;
 
   /** @throws GaussianSplatError `argument/value` for a renderer that is not initialized, or does not use WebGPU. */
   constructor(renderer: WebGPURenderer, options: SplatRendererOptions = {}) {
@@ -74,7 +74,7 @@ export class SplatRenderer {
     this.#renderer = renderer;
     this.#device = device;
     this.#options = options;
-    this.#colours = new LinearColours(device);
+    this.#colors = new LinearColors(device);
     registerSceneHost(generatedSplatsHost);
   }
 
@@ -118,8 +118,8 @@ export class SplatRenderer {
       clipDepth: camera.coordinateSystem === WebGPUCoordinateSystem ? '0..1' : '-1..1',
     });
     const depth = stored ? this.#depthOf(this.#gpu(stored), camera) : undefined;
-    const picture = { target: this.#gpu(target.texture), over: 'target', colours: this.#colours, depth } as const;
-    world.viewpoint.draw(view, picture);
+    const image = { target: this.#gpu(target.texture), over: 'target', colors: this.#colors, depth } as const;
+    world.viewpoint.draw(view, image);
   }
 
   /**
@@ -156,8 +156,8 @@ export class SplatRenderer {
       }
     }
     if (camera !== undefined) return;
-    this.#colours.destroy();
-    disposePicture(this.#frame);
+    this.#colors.destroy();
+    disposeImage(this.#frame);
     this.#frame = undefined;
     this.#forgetMapped();
   }
@@ -174,30 +174,30 @@ export class SplatRenderer {
   }
 
   /** Intermediate target of a whole frame for the canvas. */
-  #frameOf(): Picture {
+  #frameOf(): RenderImage {
     const { width, height } = this.#renderer.getRenderTarget() ?? drawingBuffer(this.#renderer, this.#size);
-    this.#frame ??= pictureOf(new DepthTexture(width, height, FloatType));
+    this.#frame ??= imageOf(new DepthTexture(width, height, FloatType));
     this.#frame.target.setSize(width, height);
     return this.#frame;
   }
 
   /** Draws a frame with a tone curve. */
-  #map(drawn: Picture, curve: ToneMapping): Picture {
+  #map(drawn: RenderImage, curve: ToneMapping): RenderImage {
     if (this.#mapped?.curve !== curve) {
       this.#forgetMapped();
       const map = quadOf(toneMapping(curve, toneMappingExposure, texture(drawn.target.texture)));
-      this.#mapped = { picture: pictureOf(), map, curve };
+      this.#mapped = { image: imageOf(), map, curve };
     }
-    const { picture, map } = this.#mapped!;
-    picture.target.setSize(drawn.target.width, drawn.target.height);
-    this.#renderer.setRenderTarget(picture.target);
+    const { image, map } = this.#mapped!;
+    image.target.setSize(drawn.target.width, drawn.target.height);
+    this.#renderer.setRenderTarget(image.target);
     map.quad.render(this.#renderer);
-    return picture;
+    return image;
   }
 
   #forgetMapped(): void {
     this.#mapped?.map.material.dispose();
-    disposePicture(this.#mapped?.picture);
+    disposeImage(this.#mapped?.image);
     this.#mapped = undefined;
   }
 
@@ -231,7 +231,7 @@ interface Quad {
 }
 
 /** A frame in linear light, and the material that copies it. */
-interface Picture {
+interface RenderImage {
   readonly target: RenderTarget;
   readonly copy: Quad;
 }
@@ -244,15 +244,15 @@ function quadOf(colors: NodeMaterial['fragmentNode']): Quad {
   return { material, quad: new QuadMesh(material) };
 }
 
-function pictureOf(depthTexture: DepthTexture | null = null): Picture {
+function imageOf(depthTexture: DepthTexture | null = null): RenderImage {
   const target = new RenderTarget(1, 1, { type: HalfFloatType, depthTexture, depthBuffer: depthTexture !== null });
   return { target, copy: quadOf(texture(target.texture)) };
 }
 
-function disposePicture(picture: Picture | undefined): void {
-  picture?.target.depthTexture?.dispose();
-  picture?.target.dispose();
-  picture?.copy.material.dispose();
+function disposeImage(image: RenderImage | undefined): void {
+  image?.target.depthTexture?.dispose();
+  image?.target.dispose();
+  image?.copy.material.dispose();
 }
 
 const drawingBuffer = (renderer: WebGPURenderer, size: Vector2): { width: number; height: number } => {

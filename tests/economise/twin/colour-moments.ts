@@ -1,5 +1,5 @@
 import { eyeOf, shCoefficientCount, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { PRIOR_VIEWS, type LoweredColours } from '../../../packages/economise/src/score.js';
+import { PRIOR_VIEWS, type ReducedSh } from '../../../packages/economise/src/score.js';
 import { shBasis } from './colour.js';
 
 /**
@@ -7,7 +7,7 @@ import { shBasis } from './colour.js';
  * energy of the views. With it the coefficients of a lower degree are set to what comes nearest to the colours that the views saw, by least squares, and
  * what that leaves of the error is known.
  */
-export class ColourMoments {
+export class ColorMoments {
   readonly #cloud: GaussianCloud;
   readonly #size: number;
   /** [N, size·(size + 1) / 2]: lower triangles, rows outermost. */
@@ -58,11 +58,11 @@ export class ColourMoments {
   }
 
   /** The colours at every degree below the cloud's. */
-  lowered(): LoweredColours[] {
+  lowered(): ReducedSh[] {
     return Array.from({ length: this.#cloud.shDegree }, (_, degree) => this.#atDegree(degree));
   }
 
-  #atDegree(degree: number): LoweredColours {
+  #atDegree(degree: number): ReducedSh {
     const { count, sh } = this.#cloud;
     const kept = 3 * (degree + 1) ** 2;
     const all = new Float32Array(kept * count);

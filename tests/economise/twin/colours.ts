@@ -3,7 +3,7 @@ import type { Projected } from '../../../packages/economise/src/merge/project.js
 import { shBasis } from './colour.js';
 
 /** Colours of the splats on the screen, [count, 3]; negative ones are black, as in the renderer. */
-export function coloursOf(cloud: GaussianCloud, { count, source }: Projected, camera: Camera): Float32Array {
+export function colorsOf(cloud: GaussianCloud, { count, source }: Projected, camera: Camera): Float32Array {
   const { positions, origin, sh, shDegree } = cloud;
   const numbers = shCoefficientCount(shDegree);
   const basis = new Float64Array(16);

@@ -5,10 +5,10 @@ import {
   reduce,
   type Cut,
   type CutFigures,
-  type DealtViews,
+  type ViewSplit,
   type Evaluator,
   type Image,
-  type JudgedViews,
+  type EvaluationViews,
   type Ranking,
   type ReducedCloud,
   type Scores,
@@ -20,7 +20,7 @@ import type { ContributionScorer } from './scorer.js';
 
 export interface PaintedEvaluatorOptions {
   /** The views of three kinds, none of which may share one: what was not seen in the first would seem unneeded in the second. */
-  readonly views: DealtViews;
+  readonly views: ViewSplit;
   /** Draws the held-out views of clouds to compare: what the result is judged by. Default {@link cpuPainter}; {@link Studio} is the project's renderer. */
   readonly studio?: Painter;
   /** Draws all other pictures; default {@link cpuPainter}. */
@@ -34,7 +34,7 @@ export class PaintedEvaluator implements Evaluator {
   readonly #cloud: GaussianCloud;
   readonly #options: PaintedEvaluatorOptions;
   /** Pictures of the whole scene, by who drew them and of which views. */
-  readonly #whole = new Map<Painter, Map<JudgedViews, Promise<Image[]>>>();
+  readonly #whole = new Map<Painter, Map<EvaluationViews, Promise<Image[]>>>();
   #scores: Scores | undefined;
 
   constructor(cloud: GaussianCloud, options: PaintedEvaluatorOptions) {
@@ -52,7 +52,7 @@ export class PaintedEvaluator implements Evaluator {
     return this.#scores ?? Promise.reject(new Error('PaintedEvaluator: rank() comes before scores()'));
   }
 
-  async cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+  async cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures> {
     const { cloud, degrees } = reduce(this.#cloud, await this.scores(), cut);
     return { errors: await this.sketch(cloud, views, signal), degrees: degreesOf(degrees) };
   }
@@ -62,12 +62,12 @@ export class PaintedEvaluator implements Evaluator {
     return reduce(this.#cloud, await this.scores(), cut);
   }
 
-  async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  async compare(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     const { studio = cpuPainter, sketcher = cpuPainter } = this.#options;
     return this.#errors(cloud, views, views === 'heldOut' ? studio : sketcher, signal);
   }
 
-  async sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  async sketch(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     return this.#errors(cloud, views, this.#options.sketcher ?? cpuPainter, signal);
   }
 
@@ -77,7 +77,7 @@ export class PaintedEvaluator implements Evaluator {
 
   async #errors(
     cloud: GaussianCloud,
-    views: JudgedViews,
+    views: EvaluationViews,
     painter: Painter,
     signal: AbortSignal | undefined,
   ): Promise<readonly number[]> {
@@ -88,8 +88,8 @@ export class PaintedEvaluator implements Evaluator {
     return images.flatMap((image, k) => (isCovered(expected[k]) ? [meanSquare(image, expected[k])] : []));
   }
 
-  #wholeBy(painter: Painter, views: JudgedViews): Promise<Image[]> {
-    const drawn = this.#whole.get(painter) ?? new Map<JudgedViews, Promise<Image[]>>();
+  #wholeBy(painter: Painter, views: EvaluationViews): Promise<Image[]> {
+    const drawn = this.#whole.get(painter) ?? new Map<EvaluationViews, Promise<Image[]>>();
     this.#whole.set(painter, drawn);
     const known = drawn.get(views) ?? painter.draw(this.#cloud, this.#options.views[views]);
     drawn.set(views, known);

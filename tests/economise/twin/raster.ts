@@ -1,7 +1,7 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import type { Image } from '@gaussian-splat/economise';
 import { ALPHA_MIN, factors, project, type Projected } from '../../../packages/economise/src/merge/project.js';
-import { coloursOf } from './colours.js';
+import { colorsOf } from './colours.js';
 import type { Painter } from './painter.js';
 import type { ContributionScorer, Contributions } from './scorer.js';
 
@@ -21,7 +21,7 @@ export function cpuScorer(cloud: GaussianCloud): ContributionScorer {
   const found = { peak: none(), energy: none(), removal: none() };
   return (camera) => {
     const projected = project(cloud, roots, camera);
-    const colours = coloursOf(cloud, projected, camera);
+    const colours = colorsOf(cloud, projected, camera);
     const order = nearToFar(projected);
     const image = newImage(camera);
     paint(projected, order, camera, colours, image);
@@ -38,7 +38,7 @@ export const cpuPainter: Painter = {
     return views.map((camera) => {
       const projected = project(cloud, roots, camera);
       const image = newImage(camera);
-      paint(projected, nearToFar(projected), camera, coloursOf(cloud, projected, camera), image);
+      paint(projected, nearToFar(projected), camera, colorsOf(cloud, projected, camera), image);
       return image;
     });
   },
@@ -72,8 +72,8 @@ class Span {
   bend = 1;
   readonly #ellipses: Float32Array;
   readonly #width: number;
-  #centreX = 0;
-  #centreY = 0;
+  #centerX = 0;
+  #centerY = 0;
   #xx = 0;
   #xy = 0;
   #yy = 0;
@@ -90,8 +90,8 @@ class Span {
   begin(k: number): void {
     const ellipses = this.#ellipses;
     const at = 6 * k;
-    this.#centreX = ellipses[at] - 0.5;
-    this.#centreY = ellipses[at + 1];
+    this.#centerX = ellipses[at] - 0.5;
+    this.#centerY = ellipses[at + 1];
     this.#xx = ellipses[at + 2];
     this.#xy = ellipses[at + 3];
     this.#yy = ellipses[at + 4];
@@ -104,15 +104,15 @@ class Span {
   enter(row: number): boolean {
     const xx = this.#xx;
     const yy = this.#yy;
-    const dy = row + 0.5 - this.#centreY;
+    const dy = row + 0.5 - this.#centerY;
     const middle = this.#xy * dy;
     const inside = middle * middle - xx * (yy * dy * dy - this.#most);
     if (!(inside > 0)) return false;
     const reach = Math.sqrt(inside);
-    this.first = Math.max(0, Math.ceil(this.#centreX - (middle + reach) / xx));
-    this.last = Math.min(this.#width - 1, Math.floor(this.#centreX - (middle - reach) / xx));
+    this.first = Math.max(0, Math.ceil(this.#centerX - (middle + reach) / xx));
+    this.last = Math.min(this.#width - 1, Math.floor(this.#centerX - (middle - reach) / xx));
     if (this.last < this.first) return false;
-    const dx = this.first - this.#centreX;
+    const dx = this.first - this.#centerX;
     this.alpha = this.#opacity * Math.exp(-0.5 * (xx * dx * dx + yy * dy * dy) - this.#xy * dx * dy);
     this.ratio = Math.exp(-xx * (dx + 0.5) - middle);
     return true;

@@ -1,6 +1,6 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { MIN_LOOKS, UNSEEN_CONTRAST, type Scores } from '../../../packages/economise/src/score.js';
-import { ColourMoments } from './colour-moments.js';
+import { ColorMoments } from './colour-moments.js';
 import type { ContributionScorer } from './scorer.js';
 
 /** Looks at a cloud from all views. */
@@ -14,7 +14,7 @@ export async function scoreSplats(
   const contribution = new Float32Array(count);
   const removalError = new Float32Array(count);
   const looks = new Uint16Array(count);
-  const colours = new ColourMoments(cloud);
+  const colours = new ColorMoments(cloud);
   for (const view of views) {
     signal?.throwIfAborted();
     const { peak, energy, removal } = await scorer(view);

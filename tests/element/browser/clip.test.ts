@@ -9,8 +9,8 @@ const CLIP = '/net/clip/ball.gsv';
 /** Of the conformance corpus: an object of six splats that moves and turns. */
 const MOVING = 'object/ObjectTrackComposed-UseChunkIndex-UseCrc';
 
-async function shows(element: GaussianSplatElement, isColour: (colour: Rgb) => boolean): Promise<boolean> {
-  return (await screenOf(element)).middleOf(isColour) !== null;
+async function shows(element: GaussianSplatElement, isColor: (colour: Rgb) => boolean): Promise<boolean> {
+  return (await screenOf(element)).middleOf(isColor) !== null;
 }
 
 async function seek(element: GaussianSplatElement, seconds: number): Promise<void> {
@@ -22,8 +22,8 @@ async function seek(element: GaussianSplatElement, seconds: number): Promise<voi
 
 async function showsAlone(element: GaussianSplatElement, frame: number): Promise<void> {
   const colours = [isRed, isGreen, isBlue];
-  for (const [k, isColour] of colours.entries())
-    assertEqual(await shows(element, isColour), k === frame % 3, `colour ${k} in frame ${frame}`);
+  for (const [k, isColor] of colours.entries())
+    assertEqual(await shows(element, isColor), k === frame % 3, `colour ${k} in frame ${frame}`);
 }
 
 const spansOf = ({ buffered }: GaussianSplatElement): number[][] =>

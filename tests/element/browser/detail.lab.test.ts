@@ -8,7 +8,7 @@ const ball = (splats: number): string => `/net/ball/red.splat?ms=0&n=${splats}`;
 
 const AT_REST = '20deg 75deg auto';
 
-const pictureOf = async (element: GaussianSplatElement): Promise<string> => {
+const imageOf = async (element: GaussianSplatElement): Promise<string> => {
   const bytes = new Uint8Array(await (await element.toBlob()).arrayBuffer());
   return bytes.join();
 };
@@ -26,7 +26,7 @@ const hasLevels = (element: GaussianSplatElement): boolean => (element.stats?.de
 describe('levels of detail of a plain file', () => {
   it('are built where pixels are named, draw fewer splats, and go without a trace', async () => {
     const element = await showLoaded({ src: ball(6_000), 'camera-orbit': '0deg 75deg 300%' });
-    const whole = await pictureOf(element);
+    const whole = await imageOf(element);
     const { bytes, inMemory } = element.stats!;
     const all = (await element.updateStats())!.drawn!;
     assert(!hasLevels(element), 'none unasked: the scene is small');
@@ -43,11 +43,11 @@ describe('levels of detail of a plain file', () => {
     );
     const few = (await element.updateStats())!.drawn!;
     assert(few < 0.5 * all, `${few} of ${all} drawn`);
-    assert((await pictureOf(element)) !== whole, 'another picture');
+    assert((await imageOf(element)) !== whole, 'another picture');
     // With the levels there and none of them drawn.
     element.detail = 'auto';
     await frames(2);
-    assert((await pictureOf(element)) === whole, 'the whole picture');
+    assert((await imageOf(element)) === whole, 'the whole picture');
     assert(/merged splats.*while they move/.test(element.stats!.why.join()), 'moving pictures may have some');
     element.quality = 'default';
     await frames(2);
@@ -56,7 +56,7 @@ describe('levels of detail of a plain file', () => {
     element.detail = 'off';
     await until(() => !hasLevels(element), 'no levels');
     assertEqual(element.stats!.bytes.scene, bytes.scene, 'bytes');
-    assert((await pictureOf(element)) === whole, 'the whole picture again');
+    assert((await imageOf(element)) === whole, 'the whole picture again');
   });
 
   // By the clock of the controller, which a busy machine draws out.

@@ -32,7 +32,7 @@ async function framesOf(images: AsyncIterable<Blob>): Promise<Blob[]> {
 }
 
 /** Greatest difference of two lists of images, in steps of 1/255. */
-async function greatestDifference(some: readonly Blob[], others: readonly Blob[]): Promise<number> {
+async function maxDifference(some: readonly Blob[], others: readonly Blob[]): Promise<number> {
   assertEqual(some.length, others.length, 'frames');
   let greatest = 0;
   for (const [i, image] of some.entries()) {
@@ -52,9 +52,9 @@ describe('the frames of a path', () => {
     const command = framesOfCommand(inRepository(src), ...way, '--frames', `${frames}`, ...WHITE);
     const element = await showLoaded({ ...STILL, src }, STYLE);
     const own = await framesOf(element.recordFrames({ ...SIZE, path, frames, background: 'white' }));
-    const difference = await greatestDifference(own, await command);
+    const difference = await maxDifference(own, await command);
     assert(difference <= 1, `${src}, ${path}: frames differ by ${difference} / 255`);
-    const change = await greatestDifference(own.slice(0, 1), own.slice(1, 2));
+    const change = await maxDifference(own.slice(0, 1), own.slice(1, 2));
     assert(change > 20, `the camera moves: ${change} / 255`);
   };
 
@@ -69,10 +69,10 @@ describe('the frames of a path', () => {
     assertEqual(element.getCameraOrbit().toString(), before, 'camera');
     const shown: Blob[] = [];
     for (let i = 0; i < 4; i++) {
-      await element.showAlong(i / 3);
+      await element.seekPath(i / 3);
       shown.push(await element.toBlob({ background: 'white' }));
     }
-    assertEqual(await greatestDifference(frames, shown), 0, 'difference');
+    assertEqual(await maxDifference(frames, shown), 0, 'difference');
   });
 
   it('end where they are to end, and say what they lack', async () => {

@@ -22,8 +22,8 @@ const MOVIE = '/net/sequence/movie.json';
 /** Frames of the movie that were fetched since this was last asked. */
 const fetchedFrames = async (): Promise<number[]> => (await (await fetch('/net/sequence/asked')).json()) as number[];
 
-async function shows(element: GaussianSplatElement, isColour: (colour: Rgb) => boolean): Promise<boolean> {
-  return (await screenOf(element)).middleOf(isColour) !== null;
+async function shows(element: GaussianSplatElement, isColor: (colour: Rgb) => boolean): Promise<boolean> {
+  return (await screenOf(element)).middleOf(isColor) !== null;
 }
 
 async function seek(element: GaussianSplatElement, seconds: number): Promise<void> {
@@ -40,7 +40,7 @@ describe('a sequence of files', () => {
     assertEqual([element.duration, element.paused, element.currentTime], [1.2, true, 0], 'duration, paused, time');
     assertEqual(element.stats?.splats, 200, 'splats of the first frame');
     assert(await shows(element, isRed), 'the first frame');
-    for (const [seconds, isColour, splats] of [
+    for (const [seconds, isColor, splats] of [
       [0.15, isGreen, 220],
       [0.25, isBlue, 240],
       [1.15, isBlue, 420],
@@ -48,9 +48,9 @@ describe('a sequence of files', () => {
     ] as const) {
       await seek(element, seconds);
       await until(() => element.stats?.splats === splats, `${splats} splats at ${seconds} s`);
-      assert(await shows(element, isColour), `the frame at ${seconds} s`);
+      assert(await shows(element, isColor), `the frame at ${seconds} s`);
       for (const other of [isRed, isGreen, isBlue]) {
-        if (other !== isColour) assert(!(await shows(element, other)), `nothing of other frames at ${seconds} s`);
+        if (other !== isColor) assert(!(await shows(element, other)), `nothing of other frames at ${seconds} s`);
       }
     }
   });
@@ -59,7 +59,7 @@ describe('a sequence of files', () => {
     const element = await showLoaded({ src: '/net/moving/movie.json', loop: '' });
     assertEqual([element.duration, element.stats?.splats], [1.2, 200], 'duration, splats');
     assert(await shows(element, isRed), 'the first frame');
-    for (const [seconds, isColour] of [
+    for (const [seconds, isColor] of [
       [0.15, isGreen],
       [0.25, isBlue],
       [1.15, isBlue],
@@ -68,9 +68,9 @@ describe('a sequence of files', () => {
       [0, isRed],
     ] as const) {
       await seek(element, seconds);
-      assert(await shows(element, isColour), `the frame at ${seconds} s`);
+      assert(await shows(element, isColor), `the frame at ${seconds} s`);
       for (const other of [isRed, isGreen, isBlue]) {
-        if (other !== isColour) assert(!(await shows(element, other)), `nothing of other frames at ${seconds} s`);
+        if (other !== isColor) assert(!(await shows(element, other)), `nothing of other frames at ${seconds} s`);
       }
     }
     let wraps = 0;

@@ -1,6 +1,6 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { MemoryLedger } from '@gaussian-splat/renderer';
-import { USUAL_STEPS } from '@gaussian-splat/economise/pages';
+import { DEFAULT_STEPS } from '@gaussian-splat/economise/pages';
 import { itInLab } from '../../support/extent-in-pages.js';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
@@ -131,7 +131,7 @@ describe('a streamed scene', () => {
     const [loader, asked] = [GaussianSplatElement.sceneLoader, [] as boolean[]];
     const coded = detailFolder(pebbles(6_000), undefined, {
       geometry: 'quantized',
-      coded: { steps: USUAL_STEPS, deflate: storedBlocks },
+      coded: { steps: DEFAULT_STEPS, deflate: storedBlocks },
     });
     const address = '/net/kept/coded/';
     const put = (path: string, body: BodyInit): Promise<unknown> => fetch(address + path, { method: 'PUT', body });

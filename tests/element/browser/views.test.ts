@@ -175,13 +175,13 @@ describe('a list of views', () => {
 
   itInLab('is a path: by a share of it, and in time', async () => {
     const element = await scene({ views: VIEWS });
-    await element.showAlong(0.5);
+    await element.seekPath(0.5);
     near(theta(element), 90, 'in the middle is the second of three');
-    await element.showAlong(7);
+    await element.seekPath(7);
     near(theta(element), 180, 'no farther than the end');
     const seen: number[] = [];
     element.addEventListener('camera-change', () => seen.push(theta(element)));
-    assertEqual(await element.flyAlong({ duration: 400 }), true);
+    assertEqual(await element.flyPath({ duration: 400 }), true);
     near(theta(element), 180, 'theta at the end');
     assert(seen[0] < 90 && seen.length > 3, seen.join());
   });

@@ -23,7 +23,7 @@ const GIF = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
 const WEBGL = { renderer: 'webgl', 'camera-orbit': '0deg 90deg 8m', ...STILL };
 /** dB between two renderers' pictures of 8 bits. */
-const LEAST_DB = 50;
+const MIN_DB = 50;
 
 /** Contexts that the element has asked for, and what they have drawn. */
 const contexts: WebGL2RenderingContext[] = [];
@@ -80,7 +80,7 @@ async function assertSame(attributes: Readonly<Record<string, string>>): Promise
     element.remove();
   }
   const found = decibels(pictures[0], pictures[1]);
-  assert(found >= LEAST_DB, `${JSON.stringify(attributes)}: ${found.toFixed(1)} dB from WebGPU's picture`);
+  assert(found >= MIN_DB, `${JSON.stringify(attributes)}: ${found.toFixed(1)} dB from WebGPU's picture`);
 }
 
 describe('renderer="webgl"', () => {
@@ -112,7 +112,7 @@ describe('renderer="webgl"', () => {
       element.remove();
     }
     const found = decibels(taken[0], taken[1]);
-    assert(found >= LEAST_DB, `${found.toFixed(1)} dB`);
+    assert(found >= MIN_DB, `${found.toFixed(1)} dB`);
   });
 
   itInLab('flights move its camera', async () => {
@@ -177,7 +177,7 @@ describe('renderer="webgl"', () => {
       await nextEvent(element, 'load');
       assertEqual(element.stats?.renderer, renderer, 'renderer');
       const found = decibels(await pixelsOf(element), webgl);
-      assert(found >= LEAST_DB, `${renderer}: ${found} dB`);
+      assert(found >= MIN_DB, `${renderer}: ${found} dB`);
     }
   });
 

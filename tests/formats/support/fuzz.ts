@@ -209,7 +209,7 @@ export interface FuzzTally {
   readonly codes: Record<string, number>;
   slowestMs: number;
   /** Most bytes of array buffers that one file had allocated when it was done with. */
-  mostBytes: number;
+  maxBytes: number;
 }
 
 /** A damaged scene may take no longer than this, ms, however busy the machine. */
@@ -224,7 +224,7 @@ export async function fuzzFormat(
   count: number,
   seed = 1,
 ): Promise<FuzzTally> {
-  const tally: FuzzTally = { files: 0, read: 0, refused: 0, codes: {}, slowestMs: 0, mostBytes: 0 };
+  const tally: FuzzTally = { files: 0, read: 0, refused: 0, codes: {}, slowestMs: 0, maxBytes: 0 };
   for (let k = 0; k < count; k++) {
     const random = seededRandom(seed * 1_000_003 + k);
     const { name, files } = scenes[k % scenes.length];
@@ -256,7 +256,7 @@ async function readDamaged(
   const before = process.memoryUsage().arrayBuffers;
   const start = performance.now();
   try {
-    validateCloud(await readScene(files[name], { name, openPart, onPreview: () => undefined }));
+    validateCloud(await readScene(files[name], { name, openFile: openPart, onPreview: () => undefined }));
     tally.read++;
   } catch (error) {
     if (!(error instanceof GaussianSplatError)) throw new Error(`${where}: an error without a name`, { cause: error });
@@ -269,7 +269,7 @@ async function readDamaged(
   const bytes = process.memoryUsage().arrayBuffers - before;
   tally.files++;
   tally.slowestMs = Math.max(tally.slowestMs, ms);
-  tally.mostBytes = Math.max(tally.mostBytes, bytes);
+  tally.maxBytes = Math.max(tally.maxBytes, bytes);
   if (ms > MAX_MS) throw new Error(`${where}: ${ms.toFixed(0)} ms`);
   if (bytes > MAX_BYTES) throw new Error(`${where}: ${bytes} bytes`);
 }

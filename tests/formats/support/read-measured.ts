@@ -16,7 +16,7 @@ async function read(file: Uint8Array, beside: string, isMesh: boolean): Promise<
     return `${sequence.frameCount} frames, ${framePath(sequence, sequence.frameCount - 1).length} characters`;
   }
   const openPart = existsSync(beside) ? async () => new Uint8Array(readFileSync(beside)) : undefined;
-  return `${(await readScene(file, { name: 'a', openPart })).count} splats`;
+  return `${(await readScene(file, { name: 'a', openFile: openPart })).count} splats`;
 }
 
 /** Most memory so far, bytes. What `resourceUsage` tells may be that of the process which started this one; on Linux its own is known. */

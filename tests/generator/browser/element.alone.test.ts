@@ -30,7 +30,7 @@ const resources = (part: string): number =>
 const sizeOf = async (url: string): Promise<number> => (await (await fetch(url)).arrayBuffer()).byteLength;
 
 /** Covered pixels of the picture on the screen, and where their middle is. */
-async function pictureOf(element: GaussianSplatElement): Promise<{ count: number; x: number; y: number }> {
+async function imageOf(element: GaussianSplatElement): Promise<{ count: number; x: number; y: number }> {
   return (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 700) ?? { count: 0, x: 0, y: 0 };
 }
 
@@ -107,20 +107,20 @@ describe('a generator in the element', () => {
     await until(() => events.includes('load'), 'load');
     assertEqual(events, ['durationchange', 'loadedmetadata', 'load']);
     assertEqual([element.stats?.splats, element.duration, element.paused], [64, 6.2831853, true]);
-    const { count } = await pictureOf(element);
+    const { count } = await imageOf(element);
     assert(count > 500, `${count} pixels are covered`);
   });
 
   it('follows the attribute time, and says when the frame is on show', async () => {
     const element = await showLoaded({ src: BALL });
-    const still = await pictureOf(element);
+    const still = await imageOf(element);
     const [seeking, seeked] = [nextEvent(element, 'seeking'), nextEvent(element, 'seeked')];
     element.setAttribute('time', '1.5707');
     await seeking;
     assert(element.seeking, 'seeking until the frame is there');
     await seeked;
     await delay(200);
-    const grown = await pictureOf(element);
+    const grown = await imageOf(element);
     assert(grown.count > 1.05 * still.count, `${still.count} pixels, then ${grown.count}`);
     assertEqual([element.currentTime, element.seeking], [1.5707, false]);
   });
@@ -171,28 +171,28 @@ describe('a generator in the element', () => {
       { src: `${FIXTURES}split.onnx` },
       'width: 120px; height: 100px; background: white',
     );
-    const rest = await pictureOf(element);
+    const rest = await imageOf(element);
     // The fixture shifts all centres by the sum of the pose, along each axis.
     element.setAttribute('pose', '[[0.3, 0, 0], [0, 0, 0.2]]');
     await element.updateComplete;
     await delay(500);
-    const shifted = await pictureOf(element);
+    const shifted = await imageOf(element);
     assert(Math.abs(shifted.x - rest.x) > 2, `middle at ${rest.x}, then ${shifted.x}`);
     element.pose = new Float32Array(6);
     await element.updateComplete;
     await delay(500);
-    const back = await pictureOf(element);
+    const back = await imageOf(element);
     assert(Math.abs(back.x - rest.x) < 1, `middle at ${rest.x}, then ${back.x}`);
     const contract = contractWith({}, { time: { role: 'control', range: [-2, 2], default: 0 } });
     const slider = await showLoaded({ src: BALL, contract });
-    const before = await pictureOf(slider);
+    const before = await imageOf(slider);
     slider.setAttribute('control-time', '1.57');
     await delay(600);
-    const grown = await pictureOf(slider);
+    const grown = await imageOf(slider);
     assert(grown.count > 1.05 * before.count, `attribute: ${before.count} pixels, then ${grown.count}`);
     slider.inputValues = { time: -1.57 };
     await delay(600);
-    const shrunk = await pictureOf(slider);
+    const shrunk = await imageOf(slider);
     assert(shrunk.count < 0.97 * before.count, `property: ${before.count} pixels, then ${shrunk.count}`);
   });
 
@@ -232,7 +232,7 @@ describe('a generator in the element', () => {
 
   it('a pose that does not fit is told once, and the last good frame stays', async () => {
     const element = await showLoaded({ src: `${FIXTURES}split.onnx` });
-    const before = await pictureOf(element);
+    const before = await imageOf(element);
     let faults = 0;
     element.addEventListener('generator-error', () => faults++);
     const event = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
@@ -241,7 +241,7 @@ describe('a generator in the element', () => {
     element.setAttribute('camera-orbit', '40deg 75deg auto');
     await delay(500);
     assertEqual([faults, element.loaded, element.error], [1, true, null]);
-    assert((await pictureOf(element)).count > 0.5 * before.count, 'the picture is gone');
+    assert((await imageOf(element)).count > 0.5 * before.count, 'the picture is gone');
   });
 
   it('makes no buffer and reads nothing back while it plays', async () => {
@@ -327,7 +327,7 @@ describe('a generator in the element', () => {
     await restored;
     assert(element.loaded && !element.paused, 'shown and playing');
     await delay(400);
-    assert((await pictureOf(element)).count > 500, 'the picture is back');
+    assert((await imageOf(element)).count > 500, 'the picture is back');
     element.pause();
   });
 });

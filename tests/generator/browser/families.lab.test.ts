@@ -50,12 +50,12 @@ async function stateAt({ header, contract }: GeneratorModel, step: number): Prom
   for (const [name, { role }] of Object.entries(contract.inputs)) {
     if (role === 'pose') state.pose = wave(name, 0.4);
     if (role === 'shape') state.shape = wave(name, 0.5);
-    if (role === 'image') given[name] = await pictureFor(name, header, step);
+    if (role === 'image') given[name] = await imageFor(name, header, step);
   }
-  return { ...state, pictures: given };
+  return { ...state, images: given };
 }
 
-async function pictureFor(name: string, { inputs }: GeneratorModel['header'], step: number): Promise<ImageTensor> {
+async function imageFor(name: string, { inputs }: GeneratorModel['header'], step: number): Promise<ImageTensor> {
   const [height, width] = inputs
     .find((input) => input.name === name)!
     .dims!.slice(2)
@@ -70,7 +70,7 @@ async function pictureFor(name: string, { inputs }: GeneratorModel['header'], st
   return tensor;
 }
 
-async function onCpu(url: string, { pictures: given = {}, ...state }: GeneratorState) {
+async function onCpu(url: string, { images: given = {}, ...state }: GeneratorState) {
   const numbers: Record<string, { dims: readonly number[]; data: Float32Array }> = {};
   for (const [name, { buffer, dims }] of Object.entries(given)) {
     const size = dims.reduce((product, dim) => product * dim, 1);
@@ -138,7 +138,7 @@ describe('every family on the GPU', () => {
       let runs = 0;
       const post = await PostProcessor.open({ url }, device, {
         onError: reportError,
-        onPicture: ({ buffer }) => {
+        onImage: ({ buffer }) => {
           runs++;
           if (isReading) found = readBuffer(device, buffer);
         },
@@ -147,7 +147,7 @@ describe('every family on the GPU', () => {
       let [error, decibels] = [0, 200];
       const ask = async (step: number): Promise<GeneratorState> => {
         const state = await stateAt(model, step);
-        post.request(state.pictures![post.input.name], state);
+        post.request(state.images![post.input.name], state);
         await post.idle;
         return state;
       };
@@ -186,7 +186,7 @@ async function compareFrames(
   instance.sink = live;
   instance.request(await stateAt(generator.model, 9));
   await instance.idle;
-  instance.request({ ...state, pictures: (await stateAt(generator.model, isConstant(generator) ? 0 : 1)).pictures });
+  instance.request({ ...state, images: (await stateAt(generator.model, isConstant(generator) ? 0 : 1)).images });
   await instance.idle;
   instance.close();
   fromCpu.ingest(uploaded(expected, layout.dtype === 'float16'), layout.capacity);

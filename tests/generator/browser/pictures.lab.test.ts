@@ -67,7 +67,7 @@ async function tensorOf(width: number, height: number, shape: ImageTensor['shape
 }
 
 /** 8 x 8 pixels of one grey. */
-const plainPicture = (grey: number): Promise<ImageBitmap> =>
+const plainImage = (grey: number): Promise<ImageBitmap> =>
   createImageBitmap(
     new ImageData(
       colourful(8, 8)
@@ -125,7 +125,7 @@ describe('a post-processor', () => {
       const errors: unknown[] = [];
       const post = await PostProcessor.open({ url: FIXTURES + name }, device, {
         onError: (error) => errors.push(error),
-        onPicture: ({ buffer, dims }) => {
+        onImage: ({ buffer, dims }) => {
           assertEqual(dims, [1, 3, height, width], 'shape');
           const i = pictures.push([]) - 1;
           reading.push(readBuffer(device, buffer).then((bytes) => void (pictures[i] = numbersOf(bytes, dtype))));
@@ -155,11 +155,11 @@ describe('a post-processor', () => {
     const reading: Promise<Uint8Array>[] = [];
     const post = await PostProcessor.open({ url: `${FIXTURES}filter-copied.onnx` }, device, {
       onError: reportError,
-      onPicture: ({ buffer }) => reading.push(readBuffer(device, buffer)),
+      onImage: ({ buffer }) => reading.push(readBuffer(device, buffer)),
     });
     const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
     for (const grey of [255, 51, 0]) {
-      tensor.upload(await plainPicture(grey));
+      tensor.upload(await plainImage(grey));
       post.request(tensor);
       await post.idle;
     }
@@ -174,7 +174,7 @@ describe('a post-processor', () => {
     const post = await PostProcessor.open({ url: `${FIXTURES}post-temporal.onnx` }, device, {
       onError: reportError,
       compare: false,
-      onPicture: ({ buffer }) => reading.push(readBuffer(device, buffer)),
+      onImage: ({ buffer }) => reading.push(readBuffer(device, buffer)),
     });
     const { tensor, pixels } = await tensorOf(32, 24, { width: 32, height: 24, dtype: 'float32' });
     for (let i = 0; i < 40; i++) {
@@ -195,7 +195,7 @@ describe('a post-processor', () => {
     const frame = new FilteredFrame(device, 48, 32);
     let pictures = 0;
     const post = await PostProcessor.open({ url: `${FIXTURES}post-fixed.onnx` }, device, {
-      onPicture: ({ buffer, dims }) => {
+      onImage: ({ buffer, dims }) => {
         frame.accept({ buffer, dims, dtype: 'float32' });
         pictures++;
       },
@@ -217,12 +217,12 @@ describe('a post-processor', () => {
     let picture: Promise<Uint8Array> | undefined;
     const urls = ['post.onnx', 'post-fixed.onnx', 'post.onnx'].map((name) => ({ url: FIXTURES + name }));
     const open = PostProcessor.open(urls, device, {
-      onPicture: ({ buffer }) => (picture = readBuffer(device, buffer)),
+      onImage: ({ buffer }) => (picture = readBuffer(device, buffer)),
     });
     // A model of any size cannot feed one of a fixed size.
     assertEqual(await codeOf(open), 'contract/chain');
     const post = await PostProcessor.open(urls.slice(1), device, {
-      onPicture: ({ buffer }) => (picture = readBuffer(device, buffer)),
+      onImage: ({ buffer }) => (picture = readBuffer(device, buffer)),
     });
     const { tensor, pixels } = await tensorOf(48, 32, { width: 48, height: 32, dtype: 'float32' });
     post.request(tensor, { controls: { gain: 0.5 } });
@@ -238,7 +238,7 @@ describe('a post-processor', () => {
   it('is none that writes Gaussians, takes Gaussians, or takes no picture', async () => {
     const found: Record<string, string> = {};
     for (const name of ['packed.onnx', 'link-fixed.onnx', 'picture.onnx']) {
-      found[name] = await codeOf(PostProcessor.open({ url: FIXTURES + name }, device, { onPicture: () => undefined }));
+      found[name] = await codeOf(PostProcessor.open({ url: FIXTURES + name }, device, { onImage: () => undefined }));
     }
     assertEqual(Object.values(found), ['contract/chain', 'contract/chain', 'contract/chain']);
   });
@@ -257,7 +257,7 @@ describe('Gaussians made of a picture', () => {
     assertEqual(code, 'argument/value');
     const { tensor, pixels } = await tensorOf(24, 16, { width: 8, height: 8, dtype: 'float32' }, 'cover');
     const ask = async (): Promise<void> => {
-      generator.request({ pictures: { image: tensor } });
+      generator.request({ images: { image: tensor } });
       await generator.idle;
     };
     await ask();
@@ -285,9 +285,9 @@ describe('Gaussians made of a picture', () => {
     const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
     const counts: number[] = [];
     for (const grey of [255, 51, 0]) {
-      tensor.upload(await plainPicture(grey));
+      tensor.upload(await plainImage(grey));
       const before = dispatches.count;
-      generator.request({ pictures: { image: tensor } });
+      generator.request({ images: { image: tensor } });
       await generator.idle;
       counts.push(dispatches.count - before);
     }
@@ -304,8 +304,8 @@ describe('Gaussians made of a picture', () => {
     const sink = (generator.sink = new ReadingSink(device));
     const tensor = new ImageTensor(device, { width: 8, height: 8, dtype: 'float32' });
     for (const grey of [255, 51, 0]) {
-      tensor.upload(await plainPicture(grey));
-      generator.request({ pictures: { image: tensor } });
+      tensor.upload(await plainImage(grey));
+      generator.request({ images: { image: tensor } });
       await generator.idle;
     }
     const rows = await Promise.all(sink.runs.map(({ tensors }) => tensors.gaussians));

@@ -144,7 +144,7 @@ describe('convolutions', () => {
       const post = await PostProcessor.open({ url }, device, {
         onError: reportError,
         onFallback: (reason) => reasons.push(reason),
-        onPicture: ({ buffer }) => (picture = readBuffer(device, buffer)),
+        onImage: ({ buffer }) => (picture = readBuffer(device, buffer)),
       });
       const tensor = new ImageTensor(device, { width: 16, height: 16, dtype: 'float32' });
       const pixels = new Uint8ClampedArray(4 * 256).map((_, i) => (i % 4 === 3 ? 255 : 128 + 100 * Math.sin(0.7 * i)));

@@ -47,7 +47,7 @@ it('a large network of images is released at rest, a small one stays; the next i
     context.fillRect(0, 0, 8, 8);
     tensor.upload(canvas);
     for (const generator of [heavy, light]) {
-      generator.request({ pictures: { image: tensor } });
+      generator.request({ images: { image: tensor } });
       await generator.idle;
     }
   };

@@ -7,7 +7,7 @@ import { proceduralScenes, resized, thinned } from '../../support/scenes.js';
 import { assert } from '../../element/browser/support/harness.js';
 
 /** dB that an image of 8 bits must reach in its worst view: rounding alone leaves 58.9 dB. */
-const LEAST_DB = 45;
+const MIN_DB = 45;
 /** Enough of each scene to tell faults apart. */
 const SPLATS = 4_000;
 const WIDTH = 160;
@@ -26,7 +26,7 @@ describe('WebGL, against the oracle', () => {
         );
         const found = await drawWithWebGl(packed, camera, accumulation);
         const decibels = psnr(found, toRgba(oracle), { mask: oracle.contributors, channels: 4, clamp: true });
-        assert(decibels >= LEAST_DB, `${makeScene.name} ${mode}: ${decibels.toFixed(1)} dB`);
+        assert(decibels >= MIN_DB, `${makeScene.name} ${mode}: ${decibels.toFixed(1)} dB`);
       }
     });
   }

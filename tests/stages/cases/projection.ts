@@ -21,7 +21,7 @@ import {
   edgeOnDiscs,
   hugeSplats,
   needles,
-  offCentre,
+  offCenter,
   pixelSplats,
   room,
   thinned,
@@ -252,7 +252,7 @@ async function checkProject(bench: Bench, cloud: GaussianCloud, camera: Camera):
 /** Every number of every splat is compared with the oracle's: enough of them for many chunks. */
 const COMPARED = 6_000;
 
-const scenes: readonly (() => Scene)[] = [room, needles, hugeSplats, pixelSplats, edgeOnDiscs, offCentre];
+const scenes: readonly (() => Scene)[] = [room, needles, hugeSplats, pixelSplats, edgeOnDiscs, offCenter];
 
 const geometryCases = scenes.flatMap((make) =>
   [false, true].flatMap((antialiased): StageCase[] => {
@@ -334,7 +334,7 @@ export const projectionCases: readonly StageCase[] = [
   {
     name: 'cull: refuses and counts splats with unusable geometry, and decides the others as without them',
     run: async (bench) => {
-      const { cloud, cameras } = offCentre();
+      const { cloud, cameras } = offCenter();
       const packed = packGaussians(cloud);
       const spoilt = withSpoiltCopies(packed);
       const alone = await cullOnGpu(bench, packed, cameras[0]);

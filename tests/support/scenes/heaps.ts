@@ -1,6 +1,6 @@
 /** Boxes with levels of detail of their own, as a streamed SOG scene has them. */
 import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
-import { layOutLevels, type LevelScene } from '@gaussian-splat/renderer/tools';
+import { layoutLevels, type LevelScene } from '@gaussian-splat/renderer/tools';
 import { randomSource } from '../gpu.js';
 import { pick } from '../lod-folder.js';
 import { pebbles } from './pebbles.js';
@@ -40,5 +40,5 @@ export function heaps(count: number): { levels: LevelScene; clouds: GaussianClou
     ...{ min: [5 * box - 1.7, -0.5, -1.7], max: [5 * box + 1.7, 0.5, 1.7] },
     counts: own.map((level) => level.count),
   }));
-  return { levels: layOutLevels(keepUsable(coarsest), boxes), clouds };
+  return { levels: layoutLevels(keepUsable(coarsest), boxes), clouds };
 }

@@ -68,7 +68,7 @@ export function equalDepthPlane(): Scene {
 }
 
 /** Principal points off the middle, one of them outside the image, with fx and fy that differ. */
-export function offCentre(): Scene {
+export function offCenter(): Scene {
   const random = seededRandom(10);
   const splats = repeat(4_000, () => ({
     position: [random.uniform(-6, 6), random.uniform(-5, 5), random.uniform(-2.7, 3)] as const,
@@ -79,7 +79,7 @@ export function offCentre(): Scene {
   }));
   const base = cameraAt([0, 0, -3], [0, 0, 0], { width: 360, height: 270 });
   return {
-    name: 'offCentre',
+    name: 'offCenter',
     cloud: cloudOf(splats),
     cameras: [
       { ...base, cx: 0.1 * base.width, cy: 0.8 * base.height, fy: 1.3 * base.fy },

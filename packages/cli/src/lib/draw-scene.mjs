@@ -48,8 +48,8 @@ function readBackground(text) {
 export async function readSceneFile(name, seconds = 0) {
   const path = resolve(from, name);
   if (isClip(name)) return clipMoment(await readWhole(path), name, seconds);
-  const openPart = (part) => readWhole(join(dirname(path), part));
-  return readScene(await readWhole(path), { name, openPart });
+  const openFile = (part) => readWhole(join(dirname(path), part));
+  return readScene(await readWhole(path), { name, openFile });
 }
 
 /**

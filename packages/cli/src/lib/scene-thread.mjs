@@ -21,9 +21,9 @@ export function readInThread(path) {
 }
 
 async function answer(path) {
-  const openPart = (part) => readWhole(join(dirname(path), part));
+  const openFile = (part) => readWhole(join(dirname(path), part));
   try {
-    const cloud = await readScene(await readWhole(path), { name: path, openPart });
+    const cloud = await readScene(await readWhole(path), { name: path, openFile });
     parentPort.postMessage({ cloud: shared(cloud) });
   } catch (error) {
     parentPort.postMessage({ error: packError(error) });

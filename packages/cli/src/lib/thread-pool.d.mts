@@ -3,9 +3,9 @@ import type { TaskPool } from '@gaussian-splat/economise';
 export function usualThreads(): number;
 
 export class ThreadPool implements TaskPool {
-  constructor(size?: number, leastSplats?: number);
+  constructor(size?: number, minSplats?: number);
   readonly size: number;
-  readonly leastSplats: number;
+  readonly minSplats: number;
   allocate: TaskPool['allocate'];
   shares: TaskPool['shares'];
   run: TaskPool['run'];

@@ -9,15 +9,15 @@ import { Worker } from 'node:worker_threads';
 import { unpackError } from './thread-errors.mjs';
 
 /** Maximum number of threads: more hardly help, because most of the work is memory bound. */
-const MOST_THREADS = 16;
+const MAX_THREADS = 16;
 /** One thread for each CPU core, up to the maximum. */
-export const usualThreads = () => Math.min(MOST_THREADS, availableParallelism());
+export const usualThreads = () => Math.min(MAX_THREADS, availableParallelism());
 
 /**
  * Smaller work is done before threads have started and been compiled; measured on two cores, when the start of each
  * took a tenth of a second of CPU time (a third of that now).
  */
-const LEAST_SPLATS = 1 << 18;
+const MIN_SPLATS = 1 << 18;
 
 /**
  * The script of a thread as one file: loading a hundred modules, on each of sixteen threads, takes five times as long
@@ -35,11 +35,11 @@ export class ThreadPool {
 
   /**
    * @param size Number of threads; they are started by the first tasks, or by `start`.
-   * @param leastSplats Minimum number of splats for using them.
+   * @param minSplats Minimum number of splats for using them.
    */
-  constructor(size = usualThreads(), leastSplats = LEAST_SPLATS) {
+  constructor(size = usualThreads(), minSplats = MIN_SPLATS) {
     this.size = size;
-    this.leastSplats = leastSplats;
+    this.minSplats = minSplats;
   }
 
   allocate(byteLength) {

@@ -39,8 +39,8 @@ export function checkOutputs(contract: Contract, outputs: Readonly<Record<string
     writtenDims(outputs[name], outputRule(contract.outputs, fields.get(name)!))!;
   const slices = attributeSlices(contract.outputs, (name) => columnsOf(dimsOf(name)));
   const rows = dimsOf(slices[0].tensor)[0];
-  const most = Math.min(rows, contract.nMax ?? rows);
-  const { live, countFaults } = liveRows(contract.outputs.count, outputs, most);
+  const max = Math.min(rows, contract.nMax ?? rows);
+  const { live, countFaults } = liveRows(contract.outputs.count, outputs, max);
   const readers = slices.map((slice) => readerOf(slice, outputs[slice.tensor]));
   const rowFaults = collectRowFaults(readers, live);
   const of = (name: string): RowReader => readers.find(({ attribute }) => attribute === name)!;
@@ -220,15 +220,15 @@ function collectRowFaults(readers: readonly RowReader[], live: number): Contract
 }
 
 /** Opacities below this are not drawn: they change no pixel of 8 bits. */
-const LEAST_OPACITY = 1 / 255;
+const MIN_OPACITY = 1 / 255;
 
 /** Corners around the finite centers of the rows that are drawn. */
 function boundsOf({ read }: RowReader, opacities: RowReader, live: number): OutputReport['bounds'] {
-  const least = opacities.activation === 'logit' ? Math.log(LEAST_OPACITY / (1 - LEAST_OPACITY)) : LEAST_OPACITY;
+  const lowest = opacities.activation === 'logit' ? Math.log(MIN_OPACITY / (1 - MIN_OPACITY)) : MIN_OPACITY;
   const min: [number, number, number] = [Infinity, Infinity, Infinity];
   const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
   for (let row = 0; row < live; row++) {
-    if (opacities.read(row, 0) < least) continue;
+    if (opacities.read(row, 0) < lowest) continue;
     for (let axis = 0; axis < 3; axis++) {
       const value = read(row, axis);
       if (!Number.isFinite(value)) continue;

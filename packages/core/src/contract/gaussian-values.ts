@@ -23,7 +23,7 @@ const HALF_SMALLEST = 2 ** -25;
 const COVARIANCE_ROUNDINGS = 16;
 
 /** Largest scale whose square is still a float32 covariance. */
-const LARGEST_SCALE = 1e18;
+const MAX_SCALE = 1e18;
 
 /** Checks one attribute of one row; undefined if it is valid. */
 export function checkRow(reader: RowReader, row: number): RowFault | undefined {
@@ -69,7 +69,7 @@ function checkOpacity({ read, isHalf }: RowReader, row: number): RowFault | unde
 
 function checkScale({ read, components }: RowReader, row: number): RowFault | undefined {
   const scales = Array.from({ length: components }, (_, i) => read(row, i));
-  if (scales.every((scale) => scale >= 0 && scale <= LARGEST_SCALE)) return undefined;
+  if (scales.every((scale) => scale >= 0 && scale <= MAX_SCALE)) return undefined;
   return {
     code: 'contract/covariance',
     expected: 'standard deviations of 0 to 1e18',

@@ -139,9 +139,9 @@ function skeletonConflicts({ joints, parents }: InputBinding & { role: 'pose' })
 function columnConflicts(outputs: OutputBinding): Conflict[] {
   if (outputs.layout !== 'packed' || outputs.columns === undefined) return [];
   const { columns, color, scaleActivation, rotationOrder } = outputs;
-  const colour = color === 'rgb' ? 'colors' : 'sh';
+  const tint = color === 'rgb' ? 'colors' : 'sh';
   const shape = columns.includes('covariances') ? ['covariances'] : ['scales', 'rotations'];
-  const wanted = ['positions', ...shape, colour, 'opacities'];
+  const wanted = ['positions', ...shape, tint, 'opacities'];
   const isComplete = columns.length === wanted.length && wanted.every((name) => columns.includes(name as 'sh'));
   if (!isComplete) {
     const remedy = 'name each attribute of a row once, in its order';

@@ -207,11 +207,11 @@ export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): { 
 }
 
 /** Integers in one packed field; none if there are more than `most`. */
-function packedVarints(bytes: LoadedBytes, span: Span, most: number): number[] {
-  if (span.end - span.start > 10 * most) return [];
+function packedVarints(bytes: LoadedBytes, span: Span, max: number): number[] {
+  if (span.end - span.start > 10 * max) return [];
   const numbers: number[] = [];
   let at = span.start;
-  while (at < span.end && numbers.length <= most) {
+  while (at < span.end && numbers.length <= max) {
     let value = 0n;
     let byte = 0x80;
     for (let shift = 0n; byte >= 0x80 && at < span.end; shift += 7n) {
@@ -220,7 +220,7 @@ function packedVarints(bytes: LoadedBytes, span: Span, most: number): number[] {
     }
     numbers.push(Number(BigInt.asIntN(64, value)));
   }
-  return numbers.length > most ? [] : numbers;
+  return numbers.length > max ? [] : numbers;
 }
 
 /** `raw_data` of 64-bit integers, if it is short. */

@@ -230,9 +230,9 @@ const typeRule: Rule = function* (node, _, values) {
 
 const sizeRule: Rule = function* (node, _, values) {
   const { operator, inputs, outputs } = node;
-  if (operator === 'Split' && outputs.length > RULES.mostSplitOutputs) {
+  if (operator === 'Split' && outputs.length > RULES.maxSplitOutputs) {
     const reason = `a Split into ${outputs.length} binds more buffers than a shader may, and the whole model runs on the CPU`;
-    yield of('failure', node, reason, `split into at most ${RULES.mostSplitOutputs}, or use Gather`);
+    yield of('failure', node, reason, `split into at most ${RULES.maxSplitOutputs}, or use Gather`);
   }
   if (operator === 'Conv') {
     const convolution = convolutionOf(node, values);

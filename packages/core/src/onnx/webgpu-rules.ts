@@ -52,7 +52,7 @@ export const WEBGPU_RULES = {
   /** The last opset whose GridSample has a kernel. */
   gridSampleOpset: 19,
   /** A Split binds a buffer for its input and one for each output; some adapters have 10 for each shader. */
-  mostSplitOutputs: 9,
+  maxSplitOutputs: 9,
   /** CumSum lets each thread sum its whole prefix. */
   longestCumSum: 4096,
   /** Export opset that satisfies all rules above. */

@@ -1,16 +1,16 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import {
-  MOVING,
-  MOVING_NAMES,
+  ANIMATED_ATTRIBUTES,
+  ANIMATED_ATTRIBUTE_NAMES,
   readScene,
   type ClipPartContent,
   type Lives,
-  type MovingName,
+  type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { concatenated } from '../concatenated.js';
 import {
-  leastCurve,
+  minCurve,
   motionFile,
   roundedPart,
   UNCHANGED,
@@ -42,14 +42,14 @@ export class TrackedPart {
   readonly #cloud: GaussianCloud;
   readonly #lives: Lives;
   readonly #frames: number;
-  readonly #followed: Readonly<Record<MovingName, Followed | undefined>>;
+  readonly #followed: Readonly<Record<AnimatedAttributeName, Followed | undefined>>;
 
   private constructor(
     scene: Uint8Array,
     cloud: GaussianCloud,
     lives: Lives,
     frames: number,
-    found: Readonly<Record<MovingName, Followed | undefined>>,
+    found: Readonly<Record<AnimatedAttributeName, Followed | undefined>>,
   ) {
     this.#scene = scene;
     this.#cloud = cloud;
@@ -86,26 +86,26 @@ export class TrackedPart {
     const frames = tracks.frames.length;
     // Relative to the written scene: static splats then have no motion, and rounding counts in the scene's fraction of
     // the error.
-    const find = (name: MovingName): Followed | undefined => {
+    const find = (name: AnimatedAttributeName): Followed | undefined => {
       const changes = changesOfTracks(tracks, { cloud: source, placeOf }, name);
       const span = (row: number): readonly [number, number] => [
         lives.first[row % cloud.count],
         lives.end[row % cloud.count],
       ];
-      return changes && followedWithin(changes, frames, span, leastCurve(finest[name]));
+      return changes && followedWithin(changes, frames, span, minCurve(finest[name]));
     };
-    const found = Object.fromEntries(MOVING_NAMES.map((name) => [name, find(name)]));
-    return new TrackedPart(scene, cloud, lives, frames, found as Record<MovingName, Followed | undefined>);
+    const found = Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.map((name) => [name, find(name)]));
+    return new TrackedPart(scene, cloud, lives, frames, found as Record<AnimatedAttributeName, Followed | undefined>);
   }
 
   /** Returns the decoded content with these quantization steps of motion. */
   contentAt(steps: MotionSteps): ClipPartContent {
     const parts = Object.fromEntries(
-      MOVING_NAMES.map((name) => {
+      ANIMATED_ATTRIBUTE_NAMES.map((name) => {
         const own = this.#followed[name];
         return [
           name,
-          own ? roundedPart(strongest(own, leastCurve(steps[name])), steps[name], this.#cloud.count) : UNCHANGED,
+          own ? roundedPart(strongest(own, minCurve(steps[name])), steps[name], this.#cloud.count) : UNCHANGED,
         ];
       }),
     ) as ClipPartContent['motion']['parts'];
@@ -119,11 +119,11 @@ export class TrackedPart {
     const { parts } = this.contentAt(steps).motion;
     const motion = motionFile({
       ...{ splats: this.#cloud.count, frames: this.#frames, lives: this.#lives, deflate },
-      parts: MOVING_NAMES.map((name) => parts[name]),
+      parts: ANIMATED_ATTRIBUTE_NAMES.map((name) => parts[name]),
     });
     return {
       splats: this.#cloud.count,
-      planes: MOVING_NAMES.reduce((sum, name) => sum + MOVING[name] * parts[name].rank, 0),
+      planes: ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name] * parts[name].rank, 0),
       sceneBytes: this.#scene.length,
       motionBytes: motion.length,
       bytes: concatenated([this.#scene, motion]),
@@ -144,11 +144,11 @@ function orderIn(read: GaussianCloud, given: GaussianCloud): Uint32Array {
 }
 
 /** Drops the curves that splats follow by less, on average. */
-function strongest({ rows, frames, curves, shares }: Followed, least: number): Followed {
+function strongest({ rows, frames, curves, shares }: Followed, min: number): Followed {
   const isStrong = shares.map((own) => {
     let sum = 0;
     for (let row = 0; row < own.length; row++) sum += own[row] * own[row];
-    return sum / own.length > least * least;
+    return sum / own.length > min * min;
   });
   return {
     ...{ rows, frames },

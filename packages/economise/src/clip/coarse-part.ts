@@ -5,7 +5,7 @@ import type { Tracks } from './tracks.js';
 /** One of at least this many neighboring splats is in the coarse part, so that every region is represented. */
 const COARSE_RUN = 8;
 /** Splats of the coarse part at most, approximately: at 30 bytes each the first frame arrives within 1.7 s at 2 Mbit/s. */
-const MOST_COARSE = 12_000;
+const MAX_COARSE = 12_000;
 
 /**
  * Divides tracks into the coarse part, which gives an image on its own, and the rest.
@@ -19,7 +19,7 @@ export function coarseAndRest(cloud: GaussianCloud, { lives, frames }: Tracks): 
   };
   const coarse: number[] = [];
   const rest: number[] = [];
-  const runLength = Math.max(COARSE_RUN, Math.ceil(order.length / MOST_COARSE));
+  const runLength = Math.max(COARSE_RUN, Math.ceil(order.length / MAX_COARSE));
   for (let at = 0; at < order.length; at += runLength) {
     const run = [...order.subarray(at, at + runLength)];
     const weights = run.map(weightOf);

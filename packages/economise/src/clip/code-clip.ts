@@ -2,13 +2,13 @@ import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-spla
 import {
   clipFrame,
   LoadBudget,
-  MOVING,
-  MOVING_NAMES,
+  ANIMATED_ATTRIBUTES,
+  ANIMATED_ATTRIBUTE_NAMES,
   readScene,
   writeClipHead,
   type ClipHead,
   type ClipPartContent,
-  type MovingName,
+  type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
 import { concatenated } from '../concatenated.js';
 import type { GpuEvaluator } from '../gpu/gpu-evaluator.js';
@@ -179,7 +179,7 @@ class ClipCoder {
   async #code(tracks: Tracks, whole: GaussianCloud, chosen: readonly Uint32Array[]): Promise<WrittenGroup> {
     const { device, deflate, maxMbps = Infinity, framesPerSecond } = this.#options;
     const frames = tracks.frames.length;
-    const most = (maxMbps * 1e6 * frames) / (8 * framesPerSecond);
+    const max = (maxMbps * 1e6 * frames) / (8 * framesPerSecond);
     const judges = await judgesOf(device, tracks.frames);
     let encoding = this.#encoding!;
     let finest = this.#steps ?? usualSteps(whole);
@@ -195,12 +195,12 @@ class ClipCoder {
         if (this.#groups.length === 0) this.#grow = await growthIn(judges[0], contents);
         const worst = Math.max(...errors);
         const group = { frames, errors, parts: parts.map((part) => part.write(steps!, deflate)) };
-        const isTooLarge = bytesOf(group) > most;
+        const isTooLarge = bytesOf(group) > max;
         this.#steps = steps;
-        if ((!isTooLarge && worst <= this.#target) || (!isTooLarge && most < Infinity) || tries === MAX_TRIES)
+        if ((!isTooLarge && worst <= this.#target) || (!isTooLarge && max < Infinity) || tries === MAX_TRIES)
           return group;
         const factor = isTooLarge
-          ? Math.min(3, (bytesOf(group) / most) ** 1.5)
+          ? Math.min(3, (bytesOf(group) / max) ** 1.5)
           : Math.max(0.5, 0.93 * Math.sqrt(this.#target / worst));
         steps = scaledSteps(steps, factor);
         finest = steps;
@@ -231,11 +231,11 @@ class ClipCoder {
       );
     const still = parts.map((part) => part.contentAt(usualSteps(frames[0])));
     const numbers = Object.fromEntries(
-      MOVING_NAMES.filter((name) => still.some(({ motion }) => motion.parts[name].rank > 0)).map((name) => [
+      ANIMATED_ATTRIBUTE_NAMES.filter((name) => still.some(({ motion }) => motion.parts[name].rank > 0)).map((name) => [
         name,
-        MOVING[name],
+        ANIMATED_ATTRIBUTES[name],
       ]),
-    ) as Partial<Steps<MovingName>>;
+    ) as Partial<Steps<AnimatedAttributeName>>;
     if (Object.keys(numbers).length === 0) return usualSteps(frames[0]);
     const { steps } = await findSteps({
       ...{ usual: usualSteps(frames[0]), numbers, measure, target: this.#target, nearEnough: NEAR_ENOUGH },
@@ -286,10 +286,10 @@ async function errorsIn(judges: readonly FrameJudge[], parts: readonly ClipPartC
 /** Finds the enlargement with which splats of the coarse part represent all best. */
 async function growthIn({ judge, frame }: FrameJudge, [coarse]: readonly ClipPartContent[]): Promise<number> {
   const cloud = frameOf([coarse], frame);
-  let [best, least] = [1, Infinity];
+  let [best, min] = [1, Infinity];
   for (const grow of GROWTHS) {
     const error = mean(await judge.compare({ ...cloud, scales: cloud.scales.map((value) => grow * value) }, 'heldOut'));
-    if (error < least) [best, least] = [grow, error];
+    if (error < min) [best, min] = [grow, error];
   }
   return best;
 }

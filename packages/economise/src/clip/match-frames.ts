@@ -2,14 +2,14 @@ import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { PlaceGrid } from './place-grid.js';
 
 /**
- * Units that make the differences of a match comparable; a pair of splats matches at a cost of {@link MOST_COST} or
+ * Units that make the differences of a match comparable; a pair of splats matches at a cost of {@link MAX_COST} or
  * less.
  */
 const COLOR_UNIT = 0.25;
 const SIZE_UNIT = 0.5;
 const OPACITY_UNIT = 0.35;
 const SHAPE_UNIT = 0.3;
-const MOST_COST = 6;
+const MAX_COST = 6;
 /** A match below this cost ends the search. */
 const SURE = 0.01;
 /** Search radius, in typical distances between neighbors. */
@@ -21,7 +21,7 @@ const SAME_NUMBERS = 0.9;
 /** Passes over the unmatched splats, with a radius from their own distances, and the maximum cost of their pairs. */
 const SPARSE_PASSES = 2;
 const SPARSE_COST = 2;
-const LEAST_SIZE = 1e-12;
+const MIN_SIZE = 1e-12;
 
 /** Features for matching splats. */
 export interface Features {
@@ -47,7 +47,7 @@ export function featuresOf(cloud: GaussianCloud, origin: readonly number[]): Fea
     const volume = scales[3 * i] * scales[3 * i + 1] * scales[3 * i + 2];
     const longest = Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]);
     looks[LOOKS * i + 3] =
-      (Math.log(Math.max(LEAST_SIZE, longest)) + Math.log(Math.max(LEAST_SIZE ** 3, volume)) / 3) / (2 * SIZE_UNIT);
+      (Math.log(Math.max(MIN_SIZE, longest)) + Math.log(Math.max(MIN_SIZE ** 3, volume)) / 3) / (2 * SIZE_UNIT);
     looks[LOOKS * i + 4] = opacities[i] / OPACITY_UNIT;
     putShape(cloud, i, looks, LOOKS * i + 5);
   }
@@ -85,7 +85,7 @@ export function matchFrames(before: Features, next: Features): Int32Array {
   if (named) return named;
   const found = new Int32Array(next.count).fill(-1);
   let looking: Uint32Array = Uint32Array.from({ length: before.count }, (_, i) => i);
-  byPlace(before, next, { grid, looking, found, most: MOST_COST });
+  byPlace(before, next, { grid, looking, found, max: MAX_COST });
   // Fast and sparse splats, such as spray, move farther than the typical distance of neighbors.
   for (let pass = 0; pass < SPARSE_PASSES; pass++) {
     const open = whichOf(found, (owner) => owner < 0);
@@ -97,7 +97,7 @@ export function matchFrames(before: Features, next: Features): Int32Array {
     const own = new Int32Array(open.length).fill(-1);
     byPlace(before, rest, {
       ...{ grid: PlaceGrid.of(rest.positions, rest.count, RADIUS), looking, found: own },
-      most: SPARSE_COST,
+      max: SPARSE_COST,
     });
     own.forEach((owner, k) => (found[open[k]] = owner));
   }
@@ -133,7 +133,7 @@ function byNumber(before: Features, next: Features, unit: number): Int32Array | 
   const found = new Int32Array(next.count).fill(-1);
   let same = 0;
   for (let i = 0; i < next.count; i++) {
-    if (costOf(before, i, next, i, unit) > MOST_COST) continue;
+    if (costOf(before, i, next, i, unit) > MAX_COST) continue;
     found[i] = i;
     same++;
   }
@@ -146,34 +146,34 @@ interface Search {
   readonly looking: Uint32Array;
   /** [splats of the next frame] index in the previous one, or -1; written. */
   readonly found: Int32Array;
-  readonly most: number;
+  readonly max: number;
 }
 
 /** Finds the cheapest pairs: if several splats choose the same one, the nearest gets it, and the others search again. */
-function byPlace(before: Features, next: Features, { grid, found, most, ...search }: Search): void {
+function byPlace(before: Features, next: Features, { grid, found, max, ...search }: Search): void {
   const costs = new Float32Array(next.count);
   let { looking } = search;
   for (let round = 0; round < ROUNDS && looking.length > 0; round++) {
     const isOpen = found.map((owner) => (owner < 0 ? 1 : 0));
     const lost: number[] = [];
     for (const i of looking) {
-      let [best, least] = [-1, most];
+      let [best, min] = [-1, max];
       grid.forEachNear(before.positions, i, (j) => {
         if (isOpen[j] === 0) return false;
-        const cost = costOf(before, i, next, j, grid.cell, least);
-        if (cost >= least) return false;
-        [best, least] = [j, cost];
+        const cost = costOf(before, i, next, j, grid.cell, min);
+        if (cost >= min) return false;
+        [best, min] = [j, cost];
         return cost < SURE;
       });
       if (best < 0) continue;
       const owner = found[best];
-      if (owner >= 0 && costs[best] <= least) {
+      if (owner >= 0 && costs[best] <= min) {
         lost.push(i);
         continue;
       }
       if (owner >= 0) lost.push(owner);
       found[best] = i;
-      costs[best] = least;
+      costs[best] = min;
     }
     looking = Uint32Array.from(lost);
   }

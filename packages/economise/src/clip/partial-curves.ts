@@ -6,13 +6,13 @@ export type Span = (row: number) => readonly [first: number, end: number];
 
 const ROUNDS = 2;
 /** Missing frames are predicted from at most this number of curves. */
-const MOST_CURVES = 10;
+const MAX_CURVES = 10;
 /** Maximum number of curves for a row with missing frames, because the cost of a fit grows with its third power. */
-const MOST_FITTED = 20;
+const MAX_FITTED = 20;
 /** Minimum fraction of valid frames for fitting a parabola. */
 const LONG = 0.3;
 /** Minimum noise, as a fraction of the typical power of rows: limits the weights that short lifetimes determine. */
-const LEAST_NOISE = 1e-6;
+const MIN_NOISE = 1e-6;
 /** Sampled rows for the typical weight of each curve. */
 const SAMPLES = 4000;
 
@@ -20,9 +20,9 @@ const SAMPLES = 4000;
  * Finds the curves that rows follow most in their valid frames, and their weights for each row; in the other frames
  * rows are replaced by the continuation of the curves.
  * @param changes [rows, frames]; invalid entries are overwritten.
- * @param least See `leastCurve`.
+ * @param least See `minCurve`.
  */
-export function followedWithin(changes: Float32Array, frames: number, span: Span, least: number): Followed {
+export function followedWithin(changes: Float32Array, frames: number, span: Span, min: number): Followed {
   const rows = changes.length / frames;
   const partial: number[] = [];
   for (let row = 0; row < rows; row++) {
@@ -30,7 +30,7 @@ export function followedWithin(changes: Float32Array, frames: number, span: Span
     if (end - first < frames) partial.push(row);
   }
   const complete = (curves: readonly Float64Array[], powers: readonly number[]): void => {
-    const fit = new RowFit(curves, powers, least);
+    const fit = new RowFit(curves, powers, min);
     for (const row of partial) {
       const own = changes.subarray(frames * row, frames * (row + 1));
       const [first, end] = span(row);
@@ -43,14 +43,14 @@ export function followedWithin(changes: Float32Array, frames: number, span: Span
     complete(polynomials, longPowers(changes, frames, span, polynomials));
   }
   for (let round = 0; partial.length > 0 && round < ROUNDS; round++) {
-    const curves = mainCurves(changes, frames, least).slice(0, MOST_CURVES);
+    const curves = mainCurves(changes, frames, min).slice(0, MAX_CURVES);
     complete(curves, powersOf(changes, frames, curves));
   }
-  const found = followed(changes, frames, least);
+  const found = followed(changes, frames, min);
   const { curves, shares } = found;
   if (partial.length > 0 && curves.length > 0) {
-    const main = curves.slice(0, MOST_FITTED);
-    const fit = new RowFit(main, powersOf(changes, frames, main), least);
+    const main = curves.slice(0, MAX_FITTED);
+    const fit = new RowFit(main, powersOf(changes, frames, main), min);
     for (const row of partial) {
       const own = fit.of(changes.subarray(frames * row, frames * (row + 1)), ...span(row));
       shares.forEach((share, k) => (share[row] = own[k] ?? 0));
@@ -122,7 +122,7 @@ class RowFit {
   constructor(curves: readonly Float64Array[], powers: readonly number[], noise: number) {
     this.#curves = curves;
     const known = powers.reduce((sum, power) => sum + (power === Infinity ? 0 : power), 0);
-    const floor = Math.max(noise ** 2, LEAST_NOISE * known);
+    const floor = Math.max(noise ** 2, MIN_NOISE * known);
     this.#weights = powers.map((power) => (power === Infinity ? 0 : floor / Math.max(power, 1e-30)));
     this.#matrix = new Float64Array(curves.length ** 2);
     this.#solution = new Float64Array(curves.length);

@@ -98,14 +98,14 @@ function spacingOf(positions: Float32Array, count: number): number {
 /** Distance to the nearest other point, by a sweep along an axis in both directions. */
 function nearest(positions: Float32Array, order: Uint32Array, place: number, axis: number): number {
   const own = order[place];
-  let least = Infinity;
+  let min = Infinity;
   for (const step of [-1, 1]) {
     for (let k = place + step; k >= 0 && k < order.length; k += step) {
       const other = order[k];
-      if (Math.abs(positions[3 * other + axis] - positions[3 * own + axis]) >= least) break;
+      if (Math.abs(positions[3 * other + axis] - positions[3 * own + axis]) >= min) break;
       const distance = Math.hypot(...[0, 1, 2].map((each) => positions[3 * other + each] - positions[3 * own + each]));
-      least = Math.min(least, distance);
+      min = Math.min(min, distance);
     }
   }
-  return least;
+  return min;
 }

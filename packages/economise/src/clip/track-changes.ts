@@ -1,5 +1,5 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
-import { MOVING, type MovingName } from '@gaussian-splat/formats';
+import { ANIMATED_ATTRIBUTES, type AnimatedAttributeName } from '@gaussian-splat/formats';
 import { turnBetween } from '../motion/write-motion.js';
 import type { Tracks } from './tracks.js';
 
@@ -10,16 +10,20 @@ export interface TrackedSplats {
   readonly placeOf: Int32Array;
 }
 
-const LEAST = 1e-12;
+const EPSILON = 1e-12;
 
 /**
  * [width · splats, frames] difference of each number of an attribute from the cloud; constant before and after a
  * splat's lifetime. Undefined if nothing differs.
  */
-export function changesOfTracks(tracks: Tracks, splats: TrackedSplats, name: MovingName): Float32Array | undefined {
+export function changesOfTracks(
+  tracks: Tracks,
+  splats: TrackedSplats,
+  name: AnimatedAttributeName,
+): Float32Array | undefined {
   const { frames } = tracks;
   const { count } = splats.cloud;
-  const changes = new Float32Array(MOVING[name] * count * frames.length);
+  const changes = new Float32Array(ANIMATED_ATTRIBUTES[name] * count * frames.length);
   const readOf = name === 'rotation' ? turnsOf(splats) : numbersOf(name, splats.cloud);
   const own = new Float64Array(3);
   let hasChanged = false;
@@ -28,7 +32,7 @@ export function changesOfTracks(tracks: Tracks, splats: TrackedSplats, name: Mov
       const place = splats.placeOf[track];
       if (place < 0) return;
       readOf(frame, i, place, own);
-      for (let k = 0; k < MOVING[name]; k++) {
+      for (let k = 0; k < ANIMATED_ATTRIBUTES[name]; k++) {
         changes[(k * count + place) * frames.length + f] = own[k];
         if (own[k] !== 0) hasChanged = true;
       }
@@ -38,7 +42,7 @@ export function changesOfTracks(tracks: Tracks, splats: TrackedSplats, name: Mov
   splats.placeOf.forEach((place, track) => {
     if (place < 0) return;
     const [first, end] = [tracks.lives.first[track], tracks.lives.end[track]];
-    for (let k = 0; k < MOVING[name]; k++) {
+    for (let k = 0; k < ANIMATED_ATTRIBUTES[name]; k++) {
       const row = changes.subarray((k * count + place) * frames.length, (k * count + place + 1) * frames.length);
       row.fill(row[first], 0, first);
       row.fill(row[end - 1], end);
@@ -50,16 +54,16 @@ export function changesOfTracks(tracks: Tracks, splats: TrackedSplats, name: Mov
 /** Writes the numbers of splat `i` of a frame minus those of splat `place` of the cloud. */
 type Read = (frame: GaussianCloud, i: number, place: number, out: Float64Array) => void;
 
-function numbersOf(name: Exclude<MovingName, 'rotation'>, cloud: GaussianCloud): Read {
+function numbersOf(name: Exclude<AnimatedAttributeName, 'rotation'>, cloud: GaussianCloud): Read {
   const stride = 3 * shCoefficientCount(cloud.shDegree);
-  const reads: Record<Exclude<MovingName, 'rotation'>, Read> = {
+  const reads: Record<Exclude<AnimatedAttributeName, 'rotation'>, Read> = {
     position: (frame, i, place, out) => {
       for (let k = 0; k < 3; k++)
         out[k] = frame.positions[3 * i + k] + (frame.origin[k] - cloud.origin[k]) - cloud.positions[3 * place + k];
     },
     scale: (frame, i, place, out) => {
       for (let k = 0; k < 3; k++)
-        out[k] = Math.log(Math.max(LEAST, frame.scales[3 * i + k]) / Math.max(LEAST, cloud.scales[3 * place + k]));
+        out[k] = Math.log(Math.max(EPSILON, frame.scales[3 * i + k]) / Math.max(EPSILON, cloud.scales[3 * place + k]));
     },
     opacity: (frame, i, place, out) => {
       out[0] = frame.opacities[i] - cloud.opacities[place];

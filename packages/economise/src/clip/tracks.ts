@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import type { Lives } from '@gaussian-splat/formats';
-import { withNearAxes } from '../motion/near-axes.js';
+import { alignAxes } from '../motion/near-axes.js';
 import { featuresOf, matchFrames, type Features } from './match-frames.js';
 
 /** Splats that are tracked from frame to frame. */
@@ -69,7 +69,7 @@ function withAxesOf(cloud: GaussianCloud, before: GaussianCloud, matches: Int32A
     for (let k = 0; k < 4; k++) cosine += rotations[4 * j + k] * cloud.rotations[4 * j + k];
     if (apart + 1 - cosine * cosine > SAME_AXES) isSame = false;
   });
-  return isSame ? cloud : withNearAxes(cloud, { ...cloud, rotations, scales });
+  return isSame ? cloud : alignAxes(cloud, { ...cloud, rotations, scales });
 }
 
 /** The splats of all tracks, each from the frame of its largest opacity. */

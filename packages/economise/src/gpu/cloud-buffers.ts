@@ -1,6 +1,6 @@
 import { shCoefficientCount, validateCloud, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import type { GaussianScene } from '@gaussian-splat/renderer';
-import type { GaussianPage } from '@gaussian-splat/renderer/tools';
+import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
 import {
   BUFFER_USAGE,
   constants,
@@ -10,7 +10,7 @@ import {
   Ingest,
   layouts,
   pageCapacity,
-  recentred,
+  recentered,
   shWords,
   withMemoryCheck,
   writeStruct,
@@ -35,7 +35,7 @@ export class CloudBuffers implements GaussianScene {
   readonly filterVariance: number | undefined;
   readonly origin: GaussianScene['origin'];
   readonly version = 0;
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly #memory: GpuMemory;
 
   private constructor(device: GPUDevice, cloud: GaussianCloud, memory: GpuMemory, pageSplats: number) {
@@ -47,9 +47,9 @@ export class CloudBuffers implements GaussianScene {
       origin: this.origin,
     } = cloud);
     this.#memory = memory;
-    const most = pageCapacity(device, 4 * Math.max(...Object.values(widthsOf(cloud.shDegree))));
-    const capacity = Math.min(most, CULL_GROUP * Math.max(1, Math.floor(pageSplats / CULL_GROUP)));
-    const pages: GaussianPage[] = [];
+    const max = pageCapacity(device, 4 * Math.max(...Object.values(widthsOf(cloud.shDegree))));
+    const capacity = Math.min(max, CULL_GROUP * Math.max(1, Math.floor(pageSplats / CULL_GROUP)));
+    const pages: GaussianBlock[] = [];
     for (let first = 0; first < cloud.count; first += capacity) {
       const page = pageOf(memory, cloud.shDegree, Math.min(capacity, cloud.count - first));
       pack(device, cloud, first, page);
@@ -67,7 +67,7 @@ export class CloudBuffers implements GaussianScene {
     validateCloud(cloud);
     const memory = new GpuMemory(device);
     try {
-      const make = (): CloudBuffers => new CloudBuffers(device, recentred(cloud), memory, pageSplats);
+      const make = (): CloudBuffers => new CloudBuffers(device, recentered(cloud), memory, pageSplats);
       return await withMemoryCheck(device, `scene of ${cloud.count} splats`, make);
     } catch (error) {
       memory.destroy();
@@ -81,7 +81,7 @@ export class CloudBuffers implements GaussianScene {
 }
 
 /** An empty block for the stage `ingest`. */
-export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): GaussianPage {
+export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): GaussianBlock {
   const { storage, copySource } = BUFFER_USAGE;
   const buffer = (name: string, bytes: number): GPUBuffer =>
     memory.buffer(`gs.economise.${name}`, bytes, storage | copySource);
@@ -94,7 +94,7 @@ export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): Gaus
 }
 
 /** Packs the splats of a block, from `first` on. The memory of the uploaded arrays is freed afterwards. */
-function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: GaussianPage): void {
+function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: GaussianBlock): void {
   const passing = new GpuMemory(device);
   try {
     const widths = widthsOf(cloud.shDegree);

@@ -1,5 +1,5 @@
 import type { GaussianScene } from '@gaussian-splat/renderer';
-import type { GaussianPage } from '@gaussian-splat/renderer/tools';
+import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, withMemoryCheck, writeStruct } from '@gaussian-splat/renderer/stages';
 import { readBack } from '@gaussian-splat/renderer/tools';
 import { economiseCut, GONE, SCORE_GROUP, UNJUDGED } from '../generated/shaders.js';
@@ -14,7 +14,7 @@ const DEGREES = 4;
  * Chunks keep their bounds.
  */
 export class CutScene implements GaussianScene {
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly #device: GPUDevice;
   readonly #scene: SceneParts;
   readonly #memory: GpuMemory;
@@ -83,14 +83,14 @@ export class CutScene implements GaussianScene {
   }
 
   /** Applies a cut to the whole scene. Splats must have been scored. */
-  apply({ minContribution = 0, removalPrice = 0, colourPrice = 0 }: Cut): void {
+  apply({ minContribution = 0, removalPrice = 0, colorPrice = 0 }: Cut): void {
     const kernel = rareKernelOf(this.#device, economiseCut);
     const bytes = new ArrayBuffer(layouts.Cut.size);
     const prices = {
       min_contribution: minContribution,
       // WGSL has no infinity.
       removal_price: Math.min(removalPrice, UNJUDGED),
-      colour_price: colourPrice,
+      color_price: colorPrice,
     };
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.cut' });
     encoder.clearBuffer(this.#kept);

@@ -2,18 +2,18 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import type { Viewpoint } from '@gaussian-splat/renderer';
 import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
 import { readBack } from '@gaussian-splat/renderer/tools';
-import type { SeenSplats } from '../pages/seen-splats.js';
-import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
+import type { SplatVisibility } from '../pages/seen-splats.js';
+import type { CutFigures, Evaluator, EvaluationViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
 import { stayingInOrder } from '../order.js';
 import { inline, poolFor, type TaskPool } from '../parts/task-pool.js';
 import { reduceInParts, writtenOrder, type Cut, type ReducedCloud } from '../reduce.js';
-import type { LoweredColours, Ranking, Scores } from '../score.js';
-import type { DealtViews } from '../views.js';
+import type { ReducedSh, Ranking, Scores } from '../score.js';
+import type { ViewSplit } from '../views.js';
 import { CloudBuffers } from './cloud-buffers.js';
 import { CutScene } from './cut-scene.js';
 import { layouts } from './layouts.js';
-import { PictureErrors } from './picture-errors.js';
+import { ImageErrors } from './image-errors.js';
 import { putLowered } from './put-lowered.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
@@ -34,7 +34,7 @@ export interface GpuEvaluatorOptions {
 /** Shaders whose pipelines are created once for a device. */
 const STAGES = [
   ...[shaders.economiseScore, shaders.economiseMoments, shaders.economiseLower, shaders.economiseCut],
-  ...[shaders.economiseTake, shaders.pictureError, shaders.pictureErrorSum],
+  ...[shaders.economiseTake, shaders.imageError, shaders.imageErrorSum],
 ];
 
 /** Their size is then a fourth of that of the moments. */
@@ -48,13 +48,13 @@ const VIEWS_AT_ONCE = 32;
 export class GpuEvaluator implements Evaluator {
   readonly #device: GPUDevice;
   readonly #cloud: GaussianCloud;
-  readonly #views: DealtViews;
+  readonly #views: ViewSplit;
   readonly #scene: SceneParts;
   readonly #viewpoint: Viewpoint;
   readonly #cutScene: CutScene;
   readonly #pool: TaskPool;
   readonly #onScored: GpuEvaluatorOptions['onScored'];
-  readonly #errors = new Map<JudgedViews, PictureErrors>();
+  readonly #errors = new Map<EvaluationViews, ImageErrors>();
   #ranking: Ranking | undefined;
   /** All splats, most visible first, computed by a thread meanwhile. Undefined without threads. */
   #order: Promise<Uint32Array> | undefined;
@@ -62,7 +62,7 @@ export class GpuEvaluator implements Evaluator {
   private constructor(
     device: GPUDevice,
     cloud: GaussianCloud,
-    views: DealtViews,
+    views: ViewSplit,
     scene: SceneParts,
     cutScene: CutScene,
     pool: TaskPool,
@@ -93,7 +93,7 @@ export class GpuEvaluator implements Evaluator {
   static async create(
     device: GPUDevice,
     cloud: GaussianCloud,
-    views: DealtViews,
+    views: ViewSplit,
     { partSplats, viewsAtOnce = VIEWS_AT_ONCE, pool = inline, onScored }: GpuEvaluatorOptions = {},
   ): Promise<GpuEvaluator> {
     const energies = Math.min(views.scored.length, viewsAtOnce);
@@ -147,7 +147,7 @@ export class GpuEvaluator implements Evaluator {
   }
 
   /** Visibility of the splats in the scoring views, which determines their quantization. */
-  async seen(): Promise<SeenSplats> {
+  async seen(): Promise<SplatVisibility> {
     if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before seen()');
     return seenIn(this.#device, this.#scene, this.#views.scored.length);
   }
@@ -164,7 +164,7 @@ export class GpuEvaluator implements Evaluator {
     return { ...this.#ranking, lowered: this.#loweredOf(records.map((bytes) => new Float32Array(bytes))) };
   }
 
-  async cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+  async cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures> {
     const errors = await this.#errorsIn(views);
     signal?.throwIfAborted();
     this.#cutScene.apply(cut);
@@ -188,7 +188,7 @@ export class GpuEvaluator implements Evaluator {
     return reduced;
   }
 
-  async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  async compare(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     const errors = await this.#errorsIn(views);
     signal?.throwIfAborted();
     const gaussians = await CloudBuffers.upload(this.#device, cloud);
@@ -199,7 +199,7 @@ export class GpuEvaluator implements Evaluator {
     }
   }
 
-  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  sketch(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     return this.compare(cloud, views, signal);
   }
 
@@ -210,10 +210,10 @@ export class GpuEvaluator implements Evaluator {
     this.#scene.destroy();
   }
 
-  async #errorsIn(views: JudgedViews): Promise<PictureErrors> {
+  async #errorsIn(views: EvaluationViews): Promise<ImageErrors> {
     const known = this.#errors.get(views);
     if (known) return known;
-    const made = await PictureErrors.of(this.#device, this.#viewpoint, this.#scene.gaussians, this.#views[views]);
+    const made = await ImageErrors.of(this.#device, this.#viewpoint, this.#scene.gaussians, this.#views[views]);
     this.#errors.set(views, made);
     return made;
   }
@@ -245,7 +245,7 @@ export class GpuEvaluator implements Evaluator {
     return { contribution, removalError };
   }
 
-  #loweredOf(parts: readonly Float32Array[]): LoweredColours[] {
+  #loweredOf(parts: readonly Float32Array[]): ReducedSh[] {
     const { count, shDegree } = this.#cloud;
     const stride = loweredNumbers(shDegree);
     const partSplats = parts[0].length / stride;

@@ -1,5 +1,5 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import type { GaussianPage } from '@gaussian-splat/renderer/tools';
+import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
 import { BUFFER_USAGE, GpuMemory, pageCapacity, withMemoryCheck } from '@gaussian-splat/renderer/stages';
 import { CloudBuffers } from './cloud-buffers.js';
 import { layouts } from './layouts.js';
@@ -9,7 +9,7 @@ const FLOAT_BYTES = 4;
 
 /** A block of the scene, and the results for its splats. */
 export interface ScenePart {
-  readonly page: GaussianPage;
+  readonly page: GaussianBlock;
   /** Index of its first splat among all, which is a multiple of 256. */
   readonly first: number;
   /** Splats in whole chunks: the stride between rows of `energies`. */
@@ -66,20 +66,20 @@ export class SceneParts {
 
   /**
    * @param views Number of views that are scored at once.
-   * @param mostSplats Maximum of a part; default: the limits of the device.
+   * @param maxSplats Maximum of a part; default: the limits of the device.
    * @throws GaussianSplatError `out-of-memory/*`
    */
   static async upload(
     device: GPUDevice,
     cloud: GaussianCloud,
     views: number,
-    mostSplats = Infinity,
+    maxSplats = Infinity,
   ): Promise<SceneParts> {
     const largest = Math.max(
       layouts.Score.size,
       FLOAT_BYTES * Math.max(views, momentNumbers(cloud.shDegree), loweredNumbers(cloud.shDegree)),
     );
-    const pageSplats = Math.min(mostSplats, pageCapacity(device, largest));
+    const pageSplats = Math.min(maxSplats, pageCapacity(device, largest));
     const gaussians = await CloudBuffers.upload(device, cloud, pageSplats);
     const memory = new GpuMemory(device);
     try {
@@ -103,7 +103,7 @@ export class SceneParts {
   }
 }
 
-function partOf(memory: GpuMemory, page: GaussianPage, first: number, views: number, degree: ShDegree): ScenePart {
+function partOf(memory: GpuMemory, page: GaussianBlock, first: number, views: number, degree: ShDegree): ScenePart {
   const row = CHUNK * Math.ceil(page.count / CHUNK);
   const { storage, copySource, copyDestination } = BUFFER_USAGE;
   const buffer = (name: string, bytesOfSplat: number): GPUBuffer =>

@@ -200,7 +200,7 @@ export class SceneScorer {
     for (const { page, row, scores, moments, lowered } of this.#scene.parts) {
       const lowering = this.#uniform(layouts.Lowering, {
         ...{ splat_count: page.count, row, views: this.#views.length, sh_degree: this.#scene.gaussians.shDegree },
-        ...{ contrast: USUAL_CONTRAST + UNSEEN_CONTRAST, prior_views: PRIOR_VIEWS, least_looks: MIN_LOOKS },
+        ...{ contrast: USUAL_CONTRAST + UNSEEN_CONTRAST, prior_views: PRIOR_VIEWS, min_looks: MIN_LOOKS },
       });
       const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.lower' });
       const pass = encoder.beginComputePass({ label: 'gs.economise.lower' });

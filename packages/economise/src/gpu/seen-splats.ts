@@ -1,6 +1,6 @@
 import { shCoefficientCount } from '@gaussian-splat/core';
 import { readBackWith } from '@gaussian-splat/renderer/tools';
-import type { SeenSplats } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/seen-splats.js';
 import { layouts } from './layouts.js';
 import type { SceneParts } from './scene-parts.js';
 
@@ -10,19 +10,19 @@ import type { SceneParts } from './scene-parts.js';
  */
 const IMAGINED = 0.1;
 /** Maximum total of root entries: a gigabyte. For larger scenes only energies are returned. */
-const MOST_ROOTS = 2 ** 28;
+const MAX_ROOTS = 2 ** 28;
 
 /**
  * Returns the visibility of a scored scene's splats in the scoring views, part by part, because the moments of a large
  * scene take gigabytes.
  * @param views Number of the views.
  */
-export async function seenIn(device: GPUDevice, scene: SceneParts, views: number): Promise<SeenSplats> {
+export async function seenIn(device: GPUDevice, scene: SceneParts, views: number): Promise<SplatVisibility> {
   const { count, shDegree } = scene.gaussians;
   const size = shCoefficientCount(shDegree);
   const numbers = shDegree > 0 ? (size * (size + 1)) / 2 : 0;
   const energies = new Float32Array(count);
-  const hasRoots = numbers > 0 && numbers * count <= MOST_ROOTS;
+  const hasRoots = numbers > 0 && numbers * count <= MAX_ROOTS;
   const roots = new Float32Array(hasRoots ? numbers * count : 0);
   const stride = layouts.Score.size / 4;
   const at = layouts.Score.fields.energy.offset / 4;

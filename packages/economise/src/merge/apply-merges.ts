@@ -53,8 +53,8 @@ export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number
 
 /** [N] index of each source splat in the reduced cloud, with N large enough for all merges. */
 function placesOf(kept: Uint32Array, { into, from }: Merges): Int32Array {
-  const most = [kept, into, from].reduce((most, list) => list.reduce((a, b) => Math.max(a, b), most), 0);
-  const places = new Int32Array(most + 1).fill(NOWHERE);
+  const max = [kept, into, from].reduce((max, list) => list.reduce((a, b) => Math.max(a, b), max), 0);
+  const places = new Int32Array(max + 1).fill(NOWHERE);
   for (let place = 0; place < kept.length; place++) places[kept[place]] = place;
   return places;
 }

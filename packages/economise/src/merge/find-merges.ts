@@ -12,7 +12,7 @@ import { PairCosts, pairState, type PairState } from './pair-costs.js';
  */
 const VIEWS = 16;
 /** Rounds of merging pairs, which may include splats merged before. */
-const MOST_ROUNDS = 6;
+const MAX_ROUNDS = 6;
 /** Equivalent cost of evaluating a splat's pairs, in splats to copy. */
 const MOVES = 32;
 /**
@@ -45,14 +45,14 @@ interface Pairs {
  * all splats are paired again, until the estimated error exceeds the limit. Estimates are too low by a factor of about
  * ten, but in the right order.
  * @param views Sixteen of them, evenly spaced, are used to evaluate pairs.
- * @param mostError Limit of the mean squared error of images.
+ * @param maxError Limit of the mean squared error of images.
  * @param pool Evaluates pairs; its size does not affect the result.
  */
 export async function findMerges(
   cloud: GaussianCloud,
   { contribution, removalError }: Ranking,
   views: readonly Camera[],
-  mostError: number,
+  maxError: number,
   pool: TaskPool = inline,
 ): Promise<Merges> {
   const chosen = poolFor(pool, MOVES * cloud.count);
@@ -63,11 +63,11 @@ export async function findMerges(
   // Splats that too few views contain are not merged.
   let slots = Uint32Array.from(removalError.keys()).filter((i) => Number.isFinite(removalError[i]));
   let spent = 0;
-  for (let round = 0; round < MOST_ROUNDS && spent < mostError; round++) {
+  for (let round = 0; round < MAX_ROUNDS && spent < maxError; round++) {
     const { first, second, costs: found } = pairsOf(await candidatesOf(state, slots, chosen), cloud.count);
     const isGone = new Uint8Array(cloud.count);
-    const most = Math.ceil(PART * first.length);
-    for (let k = 0; k < most && spent < mostError; k++) {
+    const max = Math.ceil(PART * first.length);
+    for (let k = 0; k < max && spent < maxError; k++) {
       const [i, j] = [first[k], second[k]];
       costs.cost(i, j);
       costs.join(i, j);
@@ -93,9 +93,9 @@ export async function findMerges(
 }
 
 /** Evenly spaced views, at most this many. */
-function evenly(views: readonly Camera[], most: number): Camera[] {
-  const step = views.length / Math.min(most, views.length);
-  return Array.from({ length: Math.min(most, views.length) }, (_, k) => views[Math.floor(k * step)]);
+function evenly(views: readonly Camera[], max: number): Camera[] {
+  const step = views.length / Math.min(max, views.length);
+  return Array.from({ length: Math.min(max, views.length) }, (_, k) => views[Math.floor(k * step)]);
 }
 
 /** Selects disjoint pairs greedily, cheapest first. */

@@ -1,6 +1,6 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import type { SeenSplats } from '../pages/seen-splats.js';
-import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
+import type { SplatVisibility } from '../pages/seen-splats.js';
+import type { CutFigures, Evaluator, EvaluationViews } from '../evaluator.js';
 import { inline, type TaskPool } from '../parts/task-pool.js';
 import { degreesOf, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
@@ -11,7 +11,7 @@ export interface MergingOptions {
   /** Views for evaluating pairs: the scoring views. */
   readonly views: readonly Camera[];
   /** Limit of the estimated cost of merges: the mean squared error of images at the target PSNR. */
-  readonly mostError: number;
+  readonly maxError: number;
   /** Finds merges in parallel; default {@link inline}. */
   readonly pool?: TaskPool;
 }
@@ -49,12 +49,12 @@ export class MergingEvaluator implements Evaluator {
   async rank(signal?: AbortSignal): Promise<Ranking> {
     const ranking = await this.#inner.rank(signal);
     signal?.throwIfAborted();
-    const { views, mostError, pool = inline } = this.#options;
-    this.#merges ??= await findMerges(this.#cloud, ranking, views, mostError, pool);
+    const { views, maxError, pool = inline } = this.#options;
+    this.#merges ??= await findMerges(this.#cloud, ranking, views, maxError, pool);
     return ranking;
   }
 
-  async cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+  async cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures> {
     if (!cut.mergePrice) return this.#inner.cut(cut, views, signal);
     const { cloud, degrees } = await this.reduce(cut, signal);
     return { errors: await this.sketch(cloud, views, signal), degrees: degreesOf(degrees) };
@@ -65,15 +65,15 @@ export class MergingEvaluator implements Evaluator {
     return cut.mergePrice ? applyMerges(reduced, this.#found, cut.mergePrice) : reduced;
   }
 
-  async seen(): Promise<SeenSplats | undefined> {
+  async seen(): Promise<SplatVisibility | undefined> {
     return this.#inner.seen?.();
   }
 
-  compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  compare(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     return this.#inner.compare(cloud, views, signal);
   }
 
-  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  sketch(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     return this.#inner.sketch(cloud, views, signal);
   }
 

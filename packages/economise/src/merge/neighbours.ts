@@ -40,12 +40,12 @@ export function treeOf(
  * @param most Number of neighbors of each point.
  * @returns [points, most] indices of the neighbors, nearest first; -1 if there are fewer.
  */
-export function nearestNeighbours(tree: PointTree, points: Uint32Array, most: number): Int32Array {
-  const found = new Int32Array(most * points.length).fill(-1);
-  const distances = new Float64Array(most);
+export function nearestNeighbors(tree: PointTree, points: Uint32Array, max: number): Int32Array {
+  const found = new Int32Array(max * points.length).fill(-1);
+  const distances = new Float64Array(max);
   for (let k = 0; k < points.length; k++) {
     distances.fill(Infinity);
-    search(tree, 0, 0, tree.order.length, points[k], distances, found.subarray(most * k, most * (k + 1)));
+    search(tree, 0, 0, tree.order.length, points[k], distances, found.subarray(max * k, max * (k + 1)));
   }
   return found;
 }
@@ -55,14 +55,14 @@ function putBox(tree: PointTree, node: number, first: number, end: number): void
   const { positions, order, boxes } = tree;
   const at = BOX * node;
   for (let axis = 0; axis < 3; axis++) {
-    let [least, most] = [Infinity, -Infinity];
+    let [min, max] = [Infinity, -Infinity];
     for (let k = first; k < end; k++) {
       const value = positions[3 * order[k] + axis];
-      if (value < least) least = value;
-      if (value > most) most = value;
+      if (value < min) min = value;
+      if (value > max) max = value;
     }
-    boxes[at + axis] = least;
-    boxes[at + 3 + axis] = most;
+    boxes[at + axis] = min;
+    boxes[at + 3 + axis] = max;
   }
   if (end - first <= LEAF) return;
   const sides = [0, 1, 2].map((axis) => boxes[at + 3 + axis] - boxes[at + axis]);

@@ -1,8 +1,8 @@
-import { nearestNeighbours, type PointTree } from './neighbours.js';
+import { nearestNeighbors, type PointTree } from './neighbours.js';
 import { PairCosts, type PairState } from './pair-costs.js';
 
 /** Candidate neighbors for merging, and the number of them that are evaluated in all views instead of in every fourth. */
-const NEIGHBOURS = 10;
+const NEIGHBORS = 10;
 export const FAVOURITES = 4;
 const GLANCE = 4;
 
@@ -20,13 +20,13 @@ export interface Partnering {
 /** Finds the most similar neighbors of each splat. */
 export function findPartners({ state, tree, slots, partners, costs: found }: Partnering): void {
   const costs = new PairCosts(state);
-  const neighbours = nearestNeighbours(tree, slots, NEIGHBOURS);
-  const glances = new Float32Array(NEIGHBOURS);
+  const neighbors = nearestNeighbors(tree, slots, NEIGHBORS);
+  const glances = new Float32Array(NEIGHBORS);
   found.fill(Infinity);
   for (let k = 0; k < slots.length; k++) {
     const i = slots[k];
-    const own = neighbours.subarray(NEIGHBOURS * k, NEIGHBOURS * (k + 1));
-    for (let n = 0; n < NEIGHBOURS; n++) glances[n] = own[n] < 0 ? Infinity : costs.cost(i, own[n], GLANCE);
+    const own = neighbors.subarray(NEIGHBORS * k, NEIGHBORS * (k + 1));
+    for (let n = 0; n < NEIGHBORS; n++) glances[n] = own[n] < 0 ? Infinity : costs.cost(i, own[n], GLANCE);
     for (let n = 0; n < FAVOURITES; n++) {
       const best = glances.indexOf(Math.min(...glances));
       if (!Number.isFinite(glances[best])) break;

@@ -19,7 +19,7 @@ const { joinMoments, MASS, ROW, X, Y, Z } = splatRows;
 /** Squared difference of a splat's color from the colors behind it, for each channel: the mean of captured scenes. */
 const CONTRAST = 0.05;
 /** Minimum number of views that must show a pair. */
-const LEAST_VIEWS = 4;
+const MIN_VIEWS = 4;
 /** ∫ Y² over the sphere is 1, so a squared coefficient divided by this is the mean square of its contribution. */
 const SPHERE = 4 * Math.PI;
 
@@ -155,13 +155,13 @@ export class PairCosts {
       const [offA, offB] = [weightA * q, weightB * p];
       apart += (offA * offA * areaA + offB * offB * areaB) / 2 - 2 * offA * offB * both;
     }
-    if (views * step < LEAST_VIEWS) return Infinity;
+    if (views * step < MIN_VIEWS) return Infinity;
     const opacity = covered / ownSquare;
     this.share = p;
     this.opacity = opacity;
     if (!(opacity <= 1)) return Infinity;
     const shape = Math.max(0, squares - 2 * opacity * products + opacity * opacity * own);
-    const square = this.#colourDifference(i, j) * Math.max(0, apart) + CONTRAST * shape;
+    const square = this.#colorDifference(i, j) * Math.max(0, apart) + CONTRAST * shape;
     return (2 * Math.PI * square) / (views * this.#state.pixels);
   }
 
@@ -195,7 +195,7 @@ export class PairCosts {
   }
 
   /** Mean squared difference of the colors of two splats over all directions, for each channel. */
-  #colourDifference(i: number, j: number): number {
+  #colorDifference(i: number, j: number): number {
     let sum = 0;
     for (let k = 0, a = this.#numbers * i, b = this.#numbers * j; k < this.#numbers; k++) {
       const difference = this.#sh[a + k] - this.#sh[b + k];
@@ -207,15 +207,15 @@ export class PairCosts {
 
 /** Writes the weight of a splat in means: its visible coverage, over all views. */
 function weigh({ rows, seen, visible, views }: PairState, i: number, contribution: number): void {
-  let [most, cover] = [0, 0];
+  let [max, cover] = [0, 0];
   for (let view = 0; view < views; view++) {
     const at = SEEN * (views * i + view);
     const amplitude = seen[at + AMPLITUDE];
     if (amplitude === 0) continue;
-    most = Math.max(most, amplitude);
+    max = Math.max(max, amplitude);
     cover += amplitude * Math.sqrt(seen[at + UU] * seen[at + VV] - seen[at + UV] ** 2);
   }
-  visible[i] = most > 0 ? Math.min(1, contribution / most) : 0;
+  visible[i] = max > 0 ? Math.min(1, contribution / max) : 0;
   rows[ROW * i + MASS] = visible[i] * cover;
 }
 

@@ -24,7 +24,7 @@ export async function tradeMerges(
   budget: number,
   measure: (cut: Cut) => Promise<MeasuredCut>,
 ): Promise<Trades> {
-  let [best, most] = [others, -1];
+  let [best, max] = [others, -1];
   for (const share of MERGE_SHARES) {
     const cutAt = (error: number): Cut => ({
       ...others.cutAt((1 - share) * error),
@@ -35,7 +35,7 @@ export async function tradeMerges(
       const { error, saved } = await measure(cutAt(next * budget));
       if (error <= budget) {
         fits = next;
-        if (saved > most) [best, most] = [{ cutAt: scaled(cutAt, next) }, saved];
+        if (saved > max) [best, max] = [{ cutAt: scaled(cutAt, next) }, saved];
         if (error > NEAR_ENOUGH * budget) break;
       } else fails = next;
       const guess = error > 0 ? (next * 0.99 * budget) / error : 2 * next;

@@ -1,12 +1,12 @@
 import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import {
   LoadBudget,
-  movedCloud,
-  MOVING,
-  MOVING_NAMES,
+  applyMotion,
+  ANIMATED_ATTRIBUTES,
+  ANIMATED_ATTRIBUTE_NAMES,
   readMotion,
   readScene,
-  type MovingName,
+  type AnimatedAttributeName,
 } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
 import { GpuEvaluator } from '../gpu/gpu-evaluator.js';
@@ -17,7 +17,7 @@ import { findSteps, scaledSteps, type Steps } from '../steps.js';
 import { viewsAround } from '../views.js';
 import type { EncodeWebp } from '../write/sog.js';
 import { tuneSog } from '../write/tune-sog.js';
-import { withNearAxes } from './near-axes.js';
+import { alignAxes } from './near-axes.js';
 import { writeMotion, type MotionSteps } from './write-motion.js';
 
 export interface CodeSequenceOptions {
@@ -66,7 +66,7 @@ export async function codeSequence(options: CodeSequenceOptions): Promise<CodedS
   const groupAt = async (begin: number): Promise<GaussianCloud[]> => {
     const frames: GaussianCloud[] = [];
     for (let frame = begin; frame < Math.min(frameCount, begin + framesPerFile); frame++) {
-      frames.push(withNearAxes(await openOrdered(frame), frames.at(-1) ?? first));
+      frames.push(alignAxes(await openOrdered(frame), frames.at(-1) ?? first));
     }
     return frames;
   };
@@ -165,17 +165,18 @@ const ARRAYS = {
 } as const;
 
 /** Numbers of a splat for each animated attribute. */
-function numbersOf(frames: readonly GaussianCloud[]): Partial<Steps<MovingName>> {
+function numbersOf(frames: readonly GaussianCloud[]): Partial<Steps<AnimatedAttributeName>> {
   const [one, other] = [frames[0], frames[frames.length >> 1]];
-  const changes = (name: MovingName): boolean => one[ARRAYS[name]].some((value, i) => value !== other[ARRAYS[name]][i]);
-  return Object.fromEntries(MOVING_NAMES.filter(changes).map((name) => [name, MOVING[name]]));
+  const changes = (name: AnimatedAttributeName): boolean =>
+    one[ARRAYS[name]].some((value, i) => value !== other[ARRAYS[name]][i]);
+  return Object.fromEntries(ANIMATED_ATTRIBUTE_NAMES.filter(changes).map((name) => [name, ANIMATED_ATTRIBUTES[name]]));
 }
 
 /** Reads back a frame of a file of motion. */
 async function frameOf(first: GaussianCloud, bytes: Uint8Array, frames: number, frame: number): Promise<GaussianCloud> {
   const budget = (): LoadBudget => new LoadBudget(2 ** 40);
   const motion = await readMotion({ bytes, name: 'motion', splats: first.count, frames, budget: budget() });
-  return movedCloud(first, motion, frame, 'motion', budget());
+  return applyMotion(first, motion, frame, 'motion', budget());
 }
 
 const notCorresponding = (frame: number, expected: number, found: number): GaussianSplatError =>

@@ -1,15 +1,15 @@
 /** Curves are computed from at most this number of rows, because more hardly change the result. */
-const MOST_ROWS = 30_000;
-const MOST_SWEEPS = 30;
+const MAX_ROWS = 30_000;
+const MAX_SWEEPS = 30;
 
 /**
  * Principal components (about 0) of the rows as curves, each with a root mean square of 1, strongest first.
  * @param rows [N, length]
  * @param least Root mean square weight below which a curve is dropped.
  */
-export function mainCurves(rows: Float32Array, length: number, least: number): Float64Array[] {
+export function mainCurves(rows: Float32Array, length: number, min: number): Float64Array[] {
   const count = rows.length / length;
-  const stride = Math.max(1, Math.floor(count / MOST_ROWS));
+  const stride = Math.max(1, Math.floor(count / MAX_ROWS));
   const products = new Float64Array(length * length);
   let used = 0;
   for (let row = 0; row < count; row += stride, used++) {
@@ -26,7 +26,7 @@ export function mainCurves(rows: Float32Array, length: number, least: number): F
   return values
     .map((value, k) => ({ value, curve: vectors[k] }))
     .sort((a, b) => b.value - a.value)
-    .filter(({ value }) => value > least * least * length)
+    .filter(({ value }) => value > min * min * length)
     .map(({ curve }) => curve.map((part) => part * Math.sqrt(length)));
 }
 
@@ -36,7 +36,7 @@ function eigen(matrix: Float64Array, size: number): { values: number[]; vectors:
     Float64Array.from({ length: size }, (_, i) => (i === k ? 1 : 0)),
   );
   const trace = Array.from({ length: size }, (_, k) => matrix[(size + 1) * k]).reduce((sum, value) => sum + value, 0);
-  for (let sweep = 0; sweep < MOST_SWEEPS; sweep++) {
+  for (let sweep = 0; sweep < MAX_SWEEPS; sweep++) {
     let rest = 0;
     for (let p = 0; p < size; p++) {
       for (let q = p + 1; q < size; q++) {

@@ -2,7 +2,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 
 const HALF = Math.SQRT1_2;
 /** Lower limit of scales, so that they have logarithms. */
-const LEAST = 1e-12;
+const EPSILON = 1e-12;
 /** The identity, and half turns about each axis: they only change signs. */
 const HALF_TURNS = [0, 1, 2, 3].map((axis) => [0, 1, 2, 3].map((k) => (k === axis ? 1 : 0)));
 /**
@@ -37,24 +37,24 @@ const NEAR = 0.1;
  * Reorders the axes of splats so that rotations and scales are nearest to those of another frame, because tools that
  * decompose covariances sort axes by length, and the order changes as splats deform.
  */
-export function withNearAxes(cloud: GaussianCloud, near: GaussianCloud): GaussianCloud {
+export function alignAxes(cloud: GaussianCloud, near: GaussianCloud): GaussianCloud {
   const [rotations, scales] = [cloud.rotations.slice(), cloud.scales.slice()];
   for (let i = 0; i < cloud.count; i++) {
     const own = cloud.rotations.subarray(4 * i, 4 * i + 4);
     const other = near.rotations.subarray(4 * i, 4 * i + 4);
     const apart = (axis: number, k: number): number =>
-      Math.log(Math.max(LEAST, cloud.scales[3 * i + axis]) / Math.max(LEAST, near.scales[3 * i + k])) ** 2;
+      Math.log(Math.max(EPSILON, cloud.scales[3 * i + axis]) / Math.max(EPSILON, near.scales[3 * i + k])) ** 2;
     const angle = (turned: ArrayLike<number>): number => {
       const cos = turned[0] * other[0] + turned[1] * other[1] + turned[2] * other[2] + turned[3] * other[3];
       return 2 * Math.acos(Math.min(1, Math.abs(cos)));
     };
-    let least = angle(own) ** 2 + apart(0, 0) + apart(1, 1) + apart(2, 2);
-    if (least < NEAR) continue;
+    let min = angle(own) ** 2 + apart(0, 0) + apart(1, 1) + apart(2, 2);
+    if (min < NEAR) continue;
     for (const { turn, axes } of RENAMINGS) {
       const turned = product([...own], turn);
       const cost = angle(turned) ** 2 + axes.reduce((sum, axis, k) => sum + apart(axis, k), 0);
-      if (cost >= least) continue;
-      least = cost;
+      if (cost >= min) continue;
+      min = cost;
       rotations.set(turned, 4 * i);
       axes.forEach((axis, k) => (scales[3 * i + k] = cloud.scales[3 * i + axis]));
     }

@@ -3,11 +3,11 @@ import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gau
 import {
   MOTION_MODES,
   MOTION_VERSION,
-  MOVING,
-  MOVING_NAMES,
+  ANIMATED_ATTRIBUTES,
+  ANIMATED_ATTRIBUTE_NAMES,
   type Lives,
-  type MovingName,
-  type MovingPart,
+  type AnimatedAttributeName,
+  type AnimatedAttribute,
 } from '@gaussian-splat/formats';
 import type { Deflate } from '../pages/page-planes.js';
 import type { Steps } from '../steps.js';
@@ -17,7 +17,7 @@ import { mainCurves } from './main-curves.js';
  * Quantization steps: `position` in world units, `rotation` in radians, `scale` in natural logarithms, `opacity` and
  * `color` (the constant coefficient) in their own units.
  */
-export type MotionSteps = Steps<MovingName>;
+export type MotionSteps = Steps<AnimatedAttributeName>;
 
 export interface MotionOptions {
   readonly steps: MotionSteps;
@@ -27,13 +27,13 @@ export interface MotionOptions {
 /** Codes below this fraction of a step become 0, because zeros cost almost no bits. */
 const DEAD_ZONE = 0.6;
 /** Curves with typical weights below this fraction of a step are dropped. */
-const LEAST_CURVE = 0.12;
-const MOST_CODE = 32_767;
+const MIN_CURVE = 0.12;
+const MAX_CODE = 32_767;
 /** An empty last block of a deflate stream. */
 const END = Uint8Array.of(3, 0);
 
 /** Motion of one attribute as written. */
-export type WrittenPart = MovingPart;
+export type WrittenPart = AnimatedAttribute;
 
 /** The principal curves of an attribute's numbers, strongest first. */
 export interface Followed {
@@ -61,10 +61,10 @@ export function writeMotion(
 ): Uint8Array<ArrayBuffer> {
   const other = frames.find(({ count }) => count !== first.count);
   if (other) throw notCorresponding(first.count, other.count);
-  const parts = MOVING_NAMES.map((name): WrittenPart => {
+  const parts = ANIMATED_ATTRIBUTE_NAMES.map((name): WrittenPart => {
     const changes = changesOf(first, frames, name);
     if (changes === undefined) return UNCHANGED;
-    return roundedPart(followed(changes, frames.length, leastCurve(steps[name])), steps[name], first.count);
+    return roundedPart(followed(changes, frames.length, minCurve(steps[name])), steps[name], first.count);
   });
   return motionFile({ splats: first.count, frames: frames.length, parts, deflate });
 }
@@ -106,9 +106,13 @@ const halvesOf = (words: Uint16Array): readonly Uint8Array[] => [
 ];
 
 /** [width · splats, frames] difference of each number from the first frame; undefined if all are unchanged. */
-function changesOf(first: GaussianCloud, frames: readonly GaussianCloud[], name: MovingName): Float32Array | undefined {
+function changesOf(
+  first: GaussianCloud,
+  frames: readonly GaussianCloud[],
+  name: AnimatedAttributeName,
+): Float32Array | undefined {
   const { count } = first;
-  const changes = new Float32Array(MOVING[name] * count * frames.length);
+  const changes = new Float32Array(ANIMATED_ATTRIBUTES[name] * count * frames.length);
   let hasChanged = false;
   const put = (number: number, i: number, frame: number, value: number): void => {
     changes[(number * count + i) * frames.length + frame] = value;
@@ -119,7 +123,7 @@ function changesOf(first: GaussianCloud, frames: readonly GaussianCloud[], name:
     const of = numbersOf(name, first);
     frames.forEach((cloud, frame) => {
       for (let i = 0; i < count; i++) {
-        for (let number = 0; number < MOVING[name]; number++)
+        for (let number = 0; number < ANIMATED_ATTRIBUTES[name]; number++)
           put(number, i, frame, of(cloud, i, number) - of(first, i, number));
       }
     });
@@ -128,15 +132,15 @@ function changesOf(first: GaussianCloud, frames: readonly GaussianCloud[], name:
 }
 
 function numbersOf(
-  name: Exclude<MovingName, 'rotation'>,
+  name: Exclude<AnimatedAttributeName, 'rotation'>,
   { shDegree, origin }: GaussianCloud,
 ): (cloud: GaussianCloud, i: number, number: number) => number {
   const stride = 3 * shCoefficientCount(shDegree);
-  const least = 1e-12;
+  const min = 1e-12;
   return {
     position: (cloud: GaussianCloud, i: number, k: number) =>
       cloud.positions[3 * i + k] + (cloud.origin[k] - origin[k]),
-    scale: ({ scales }: GaussianCloud, i: number, k: number) => Math.log(Math.max(least, scales[3 * i + k])),
+    scale: ({ scales }: GaussianCloud, i: number, k: number) => Math.log(Math.max(min, scales[3 * i + k])),
     opacity: ({ opacities }: GaussianCloud, i: number) => opacities[i],
     color: ({ sh }: GaussianCloud, i: number, k: number) => sh[stride * i + k],
   }[name];
@@ -178,14 +182,14 @@ export function turnBetween(from: Float32Array, to: Float32Array, at: number, tu
 export const UNCHANGED: WrittenPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
 
 /** Minimum typical weight of a curve at a step. */
-export const leastCurve = (step: number): number => LEAST_CURVE * step;
+export const minCurve = (step: number): number => MIN_CURVE * step;
 
 /**
  * @param changes [rows, frames]
- * @param least See {@link leastCurve}.
+ * @param least See {@link minCurve}.
  */
-export function followed(changes: Float32Array, frames: number, least: number): Followed {
-  const curves = mainCurves(changes, frames, least);
+export function followed(changes: Float32Array, frames: number, min: number): Followed {
+  const curves = mainCurves(changes, frames, min);
   return { rows: changes.length / frames, frames, curves, shares: curves.map((curve) => sharesOf(changes, curve)) };
 }
 
@@ -207,8 +211,8 @@ export function roundedPart(
   asked: number,
   splats: number,
 ): WrittenPart {
-  const most = shares.reduce((all, own) => own.reduce((largest, value) => Math.max(largest, Math.abs(value)), all), 0);
-  const step = Math.fround(Math.max(asked, most / MOST_CODE));
+  const max = shares.reduce((all, own) => own.reduce((largest, value) => Math.max(largest, Math.abs(value)), all), 0);
+  const step = Math.fround(Math.max(asked, max / MAX_CODE));
   const codes = shares.map((own) =>
     Int16Array.from(own, (value) => (Math.abs(value) < DEAD_ZONE * step ? 0 : Math.round(value / step))),
   );

@@ -24,7 +24,7 @@ import {
   pageLayout,
   parentErrors,
   QUANTIZED_CHUNK_WORDS,
-  recentred,
+  recentered,
   type ShPrecision,
   type SplatLevel,
   widenReach,
@@ -78,7 +78,7 @@ export interface DetailTreeOptions {
 export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOptions = {}): DetailTree {
   validateCloud(given);
   const standing = upright(given);
-  const cloud = recentred(standing);
+  const cloud = recentered(standing);
   const kept = packedOrder(cloud);
   const { antialiased, filterVariance, origin, hints } = cloud;
   const shPrecision = choosePrecision(noiseIn(cloud), kept);

@@ -11,7 +11,7 @@ import {
   FILE_FLOATS,
   interleaved,
   isOfPlanes,
-  LEAST_OPACITY_STEP,
+  MIN_OPACITY_STEP,
   MIDDLE,
   type PageCoding,
   PLANES,
@@ -24,13 +24,13 @@ import {
 import type { BuiltPage, DetailTree } from './build-pages.js';
 import { headOf, joined, Planes, type Deflate } from './page-planes.js';
 import { differencesOf, HarmonicRounder } from './round-harmonics.js';
-import type { SeenSplats } from './seen-splats.js';
+import type { SplatVisibility } from './seen-splats.js';
 import { numberOf, SplatWeights } from './splat-weights.js';
 
 const { CULL_GROUP, ALPHA_MIN, QUANTIZED_OPAQUE, QUANTIZED_T_ZERO, QUANTIZED_UV_ZERO } = constants;
-const MOST_PLACES = 65_535;
-const MOST_SIZES = 255;
-const MOST_COLOR = 32_000;
+const MAX_PLACES = 65_535;
+const MAX_SIZES = 255;
+const MAX_COLOR = 32_000;
 /** Rank of the splat size, as a fraction of a chunk's splats, that determines the coordinate step. */
 const SIZE_RANK = 0.35;
 /**
@@ -59,7 +59,7 @@ export interface PageSteps {
 }
 
 /** Default steps for an unknown scene: about 45 to 50 dB. */
-export const USUAL_STEPS: PageSteps = {
+export const DEFAULT_STEPS: PageSteps = {
   ...{ place: 0.15, size: 1 / 16, direction: 1 / 48, opacity: 1 / 90, color: 1 / 28, chroma: 1 / 14 },
   harmonics: 1 / 40,
 };
@@ -71,13 +71,13 @@ export interface WrittenCoding extends PageCoding {
 }
 
 /** Returns the nearest steps that files can represent. */
-export function codingOf(steps: PageSteps): WrittenCoding {
+export function codingFor(steps: PageSteps): WrittenCoding {
   const odd = 2 * Math.round((1 / steps.direction - 1) / 2) + 1;
   const scale = Math.round(SCALE_STEPS * (Math.log2(127 * steps.harmonics) + SCALE_BIAS));
   return {
     size: Math.min(1, Math.max(1 / 48, steps.size)),
     directions: Math.min(255, Math.max(3, odd)),
-    opacity: Math.min(512, Math.max(LEAST_OPACITY_STEP, Math.round(QUANTIZED_OPAQUE * steps.opacity))),
+    opacity: Math.min(512, Math.max(MIN_OPACITY_STEP, Math.round(QUANTIZED_OPAQUE * steps.opacity))),
     color: steps.color,
     chroma: steps.chroma,
     scale: Math.min(255 - CLASS_STEP * (CLASSES - 1), Math.max(0, scale)),
@@ -93,7 +93,7 @@ export interface PageEncoderOptions {
    * Visibility of the splats of the tree's cloud: less visible ones are quantized more coarsely. Default: estimated
    * from opacities and sizes.
    */
-  readonly seen?: SeenSplats | undefined;
+  readonly seen?: SplatVisibility | undefined;
 }
 
 /** Writes coded files of pages: see docs/lod-format.md. */
@@ -127,20 +127,20 @@ export class PageEncoder {
       shDegree,
     );
     const largest = holds.reduce(
-      (most, [level, chunk], k) => Math.max(most, largestOf(levels[level], CULL_GROUP * chunk, counts[k])),
+      (max, [level, chunk], k) => Math.max(max, largestOf(levels[level], CULL_GROUP * chunk, counts[k])),
       0,
     );
-    const least = Math.fround((largest > 0 ? Math.log2(largest) : 0) - MOST_SIZES * this.#coding.size);
+    const min = Math.fround((largest > 0 ? Math.log2(largest) : 0) - MAX_SIZES * this.#coding.size);
     const floats = new Float32Array(CHUNK_FLOATS * chunks + FILE_FLOATS);
     holds.forEach(([level, chunk], k) => {
       if (k > 0 && level !== holds[k - 1][0]) planes.beginLower();
       const splats = this.#ordered(levels[level], CULL_GROUP * chunk, counts[k]);
-      const reach = this.#putSplats(levels[level], splats, least, planes);
+      const reach = this.#putSplats(levels[level], splats, min, planes);
       floats.set([...splats.origin, splats.step, reach, ...rowOf(errors[level], chunk)], CHUNK_FLOATS * k);
     });
     const [level, chunk] = holds[0];
     const above = level + 1 < errors.length ? rowOf(errors[level + 1], chunk >> 2) : [0, 0, 0, 0, ENDLESS];
-    floats.set([...above, least], CHUNK_FLOATS * chunks);
+    floats.set([...above, min], CHUNK_FLOATS * chunks);
     return joined(headOf(counts, floats, { chunks, shDegree }), planes, this.#deflate);
   }
 
@@ -149,7 +149,7 @@ export class PageEncoder {
   }
 
   /** Writes splats to planes. @returns Their reach, as in boundLevel. */
-  #putSplats(level: SplatLevel, { splats }: Ordered, least: number, planes: Planes): number {
+  #putSplats(level: SplatLevel, { splats }: Ordered, min: number, planes: Planes): number {
     const octaves = this.#octavesOf(level);
     let [fine, coarse, reach] = [0, 0, 0];
     for (const splat of splats) {
@@ -160,7 +160,7 @@ export class PageEncoder {
         planes.put(PLANES.place + byte, low >> (8 * byte));
         planes.put(PLANES.place + 3 + byte, high >> (8 * byte));
       }
-      reach = Math.max(reach, putShape(level, splat.i, { least, octaves, coding: this.#coding }, planes));
+      reach = Math.max(reach, putShape(level, splat.i, { min, octaves, coding: this.#coding }, planes));
       this.#putColors(level, splat.i, octaves, planes);
       planes.count++;
     }
@@ -174,7 +174,7 @@ export class PageEncoder {
     const { color, chroma } = this.#coding;
     differencesOf(sh, first).forEach((value, n) => {
       const steps = roundedTo((value - shift[n]) / (n === 0 ? color : chroma), octaves.color);
-      const code = MIDDLE + Math.max(-MOST_COLOR, Math.min(MOST_COLOR, steps));
+      const code = MIDDLE + Math.max(-MAX_COLOR, Math.min(MAX_COLOR, steps));
       planes.put(PLANES.color + 2 * n, code);
       planes.put(PLANES.color + 2 * n + 1, code >> 8);
     });
@@ -202,7 +202,7 @@ export class PageEncoder {
     const origin = [0, 1, 2].map((axis) => extremeOf(own, axis, Math.min));
     const extent = Math.max(...origin.map((low, axis) => extremeOf(own, axis, Math.max) - low));
     const size = this.#coding.place * typicalSize(level, first, count) * 2 ** this.#octavesOf(level).place;
-    const step = Math.fround(Math.max(size, (1.0001 * extent) / MOST_PLACES));
+    const step = Math.fround(Math.max(size, (1.0001 * extent) / MAX_PLACES));
     const splats = Array.from({ length: count }, (_, k) => {
       const [x, y, z] = origin.map((low, axis) => (step > 0 ? Math.round((own[3 * k + axis] - low) / step) : 0));
       return { i: first + k, coarse: interleaved(x >> 8, y >> 8, z >> 8), fine: interleaved(x, y, z) };
@@ -255,7 +255,7 @@ function typicalSize({ factors }: SplatLevel, first: number, count: number): num
 function putShape(
   { factors, opacities }: SplatLevel,
   i: number,
-  { least, octaves, coding }: { least: number; octaves: Octaves; coding: PageCoding },
+  { min, octaves, coding }: { min: number; octaves: Octaves; coding: PageCoding },
   planes: Planes,
 ): number {
   const f = FACTOR_NUMBERS * i;
@@ -263,9 +263,9 @@ function putShape(
   rowLengths(factors, f, lengths);
   let trace = 0;
   lengths.forEach((length, k) => {
-    const code = Math.min(MOST_SIZES, Math.max(0, roundedTo((Math.log2(length) - least) / coding.size, octaves.size)));
+    const code = Math.min(MAX_SIZES, Math.max(0, roundedTo((Math.log2(length) - min) / coding.size, octaves.size)));
     planes.put(PLANES.size + k, code);
-    trace += 2 ** (2 * (least + coding.size * code));
+    trace += 2 ** (2 * (min + coding.size * code));
   });
   // Same sign convention as packQuantizedChunk.
   const [first, second] = [factors[f] < 0 ? -1 : 1, factors[f + 2] < 0 ? -1 : 1];

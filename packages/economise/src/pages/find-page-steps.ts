@@ -5,9 +5,9 @@ import { decibels, mean, meanSquareOf } from '../measure.js';
 import { findSteps, type Steps } from '../steps.js';
 import { viewsAround, viewsFromEverywhere } from '../views.js';
 import { manifestOf, type BuiltPage, type DetailTree } from './build-pages.js';
-import { codingOf, PageEncoder, USUAL_STEPS, type PageSteps } from './encode-page.js';
+import { codingFor, PageEncoder, DEFAULT_STEPS, type PageSteps } from './encode-page.js';
 import type { Deflate } from './page-planes.js';
-import type { SeenSplats } from './seen-splats.js';
+import type { SplatVisibility } from './seen-splats.js';
 
 export interface PageStepsOptions {
   readonly tree: DetailTree;
@@ -29,7 +29,7 @@ export interface PageStepsOptions {
 export interface FoundPageSteps {
   readonly steps: PageSteps;
   /** Visibility of the splats of the cloud; undefined for a cloud without harmonics. */
-  readonly seen: SeenSplats | undefined;
+  readonly seen: SplatVisibility | undefined;
   /** PSNR of all held-out views together, and of the worst one. */
   readonly decibels: number;
   readonly worstDecibels: number;
@@ -54,7 +54,7 @@ export async function findPageSteps(options: PageStepsOptions): Promise<FoundPag
     const seen = shDegree > 0 ? await evaluator.seen() : undefined;
     const decoded = (steps: PageSteps) => cloudOfPages(options, steps, seen);
     const found = await findSteps({
-      usual: USUAL_STEPS as Steps<keyof PageSteps>,
+      usual: DEFAULT_STEPS as Steps<keyof PageSteps>,
       numbers: numbersOf(shDegree),
       target: meanSquareOf(minDecibels),
       measure: async (steps) => mean(await evaluator.compare(await decoded(steps), 'searched')),
@@ -81,9 +81,9 @@ const numbersOf = (degree: ShDegree): Partial<Steps<keyof PageSteps>> => ({
 async function cloudOfPages(
   { tree, pages, deflate }: Pick<PageStepsOptions, 'tree' | 'pages' | 'deflate'>,
   steps: PageSteps,
-  seen: SeenSplats | undefined,
+  seen: SplatVisibility | undefined,
 ): Promise<GaussianCloud> {
-  const coding = codingOf(steps);
+  const coding = codingFor(steps);
   const encoder = new PageEncoder(tree, coding, { deflate, seen });
   const scene = manifestOf(tree, [], String, coding);
   const parts = [];

@@ -9,9 +9,9 @@ export {
   type DetailTreeOptions,
 } from './build-pages.js';
 export {
-  codingOf,
+  codingFor,
   PageEncoder,
-  USUAL_STEPS,
+  DEFAULT_STEPS,
   type PageEncoderOptions,
   type PageSteps,
   type WrittenCoding,
@@ -20,5 +20,5 @@ export { findPageSteps, type FoundPageSteps, type PageStepsOptions } from './fin
 export { placesOnGrid, writePages, type FolderCoding, type PageFolderOptions } from './page-folder.js';
 export type { Deflate } from './page-planes.js';
 export { HarmonicRounder } from './round-harmonics.js';
-export { weighSplats, type SeenSplats } from './seen-splats.js';
-export { treeOfCopies } from './tile-tree.js';
+export { visibilityWeights, type SplatVisibility } from './seen-splats.js';
+export { instancedTree } from './tile-tree.js';

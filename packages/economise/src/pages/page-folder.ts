@@ -2,7 +2,7 @@ import type { Vector3 } from '@gaussian-splat/core';
 import type { DetailManifest } from '@gaussian-splat/renderer/tools';
 import { cutPages, manifestOf, packPage, type BuiltPage, type DetailTree } from './build-pages.js';
 import { PageEncoder, type PageEncoderOptions, type WrittenCoding } from './encode-page.js';
-import { treeOfCopies } from './tile-tree.js';
+import { instancedTree } from './tile-tree.js';
 
 /** Coding of the files of a folder. */
 export interface FolderCoding extends PageEncoderOptions {
@@ -29,7 +29,7 @@ export function writePages(tree: DetailTree, { coded, places, put }: PageFolderO
     return manifestOf(from, pages, fileOf, coded?.coding);
   };
   if (places === undefined) return write('scene', tree, cutPages(tree));
-  const above = treeOfCopies(tree, places);
+  const above = instancedTree(tree, places);
   const abovePages = cutPages(above);
   // Visibility is known only for the scene itself.
   const top = write('top', above, abovePages, coded && { ...coded, seen: undefined });

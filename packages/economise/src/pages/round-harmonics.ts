@@ -1,8 +1,8 @@
 import { CHROMA_CODES } from '@gaussian-splat/renderer/tools';
-import type { SeenSplats } from './seen-splats.js';
+import type { SplatVisibility } from './seen-splats.js';
 
 /** Maximum steps of a channel: the range of a signed byte. */
-const MOST_STEPS = 127;
+const MAX_STEPS = 127;
 /** Diagonal of the root for a splat that is visible from all directions: 1 / √(4 π). */
 const EVEN_PIVOT = 0.28209479177387814;
 /**
@@ -21,15 +21,15 @@ export function differencesOf(sh: Float32Array, at: number): [luma: number, oran
  * Quantizes the coefficients of a splat's color above the constant one, from the last to the first: each compensates
  * the rounding of the previous ones in the colors of the views (successive cancellation, Babai's nearest plane).
  */
-export class SeenRounder {
-  readonly #seen: SeenSplats | undefined;
+export class ShQuantizer {
+  readonly #seen: SplatVisibility | undefined;
   readonly #size: number;
   /** Rounding error of each coefficient. */
   readonly #added: Float64Array;
   readonly #root: Float64Array;
 
   /** @param size Number of coefficients of a channel. */
-  constructor(size: number, seen: SeenSplats | undefined) {
+  constructor(size: number, seen: SplatVisibility | undefined) {
     this.#size = size;
     this.#seen = seen;
     this.#added = new Float64Array(3 * size);
@@ -86,13 +86,13 @@ export class SeenRounder {
 export class HarmonicRounder {
   /** Codes of the last splat: all lumas, then red minus blue, then green minus their mean. */
   readonly codes: Int8Array;
-  readonly #rounder: SeenRounder;
+  readonly #rounder: ShQuantizer;
   readonly #size: number;
 
   /** @param size Number of coefficients of a channel. */
-  constructor(size: number, seen: SeenSplats | undefined) {
+  constructor(size: number, seen: SplatVisibility | undefined) {
     this.#size = size;
-    this.#rounder = new SeenRounder(size, seen);
+    this.#rounder = new ShQuantizer(size, seen);
     this.codes = new Int8Array(3 * (size - 1));
   }
 
@@ -110,7 +110,7 @@ export class HarmonicRounder {
       (k) => differencesOf(sh, at + 3 * k),
       (value, weight, k, n) => {
         const spacing = n === 0 ? step : CHROMA_CODES * step;
-        const code = Math.sign(value) * Math.min(MOST_STEPS, roundedBy(Math.abs(value) / spacing, weight));
+        const code = Math.sign(value) * Math.min(MAX_STEPS, roundedBy(Math.abs(value) / spacing, weight));
         codes[count * n + k - 1] = code;
         return code * spacing;
       },
@@ -129,9 +129,7 @@ export class HarmonicRounder {
 function fits(luma: number, orange: number, green: number): boolean {
   const [rest, half] = [Math.abs(luma - (CHROMA_CODES / 2) * green), (CHROMA_CODES / 2) * Math.abs(orange)];
   return (
-    rest + half <= MOST_STEPS &&
-    Math.abs(luma + (CHROMA_CODES / 2) * green) <= MOST_STEPS &&
-    Math.abs(luma) < MOST_STEPS
+    rest + half <= MAX_STEPS && Math.abs(luma + (CHROMA_CODES / 2) * green) <= MAX_STEPS && Math.abs(luma) < MAX_STEPS
   );
 }
 

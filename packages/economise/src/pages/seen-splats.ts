@@ -1,5 +1,5 @@
 /** Visibility of the splats of a cloud, by their indices in it. */
-export interface SeenSplats {
+export interface SplatVisibility {
   /**
    * [N] mean over the views of the sum of a splat's squared weights, as a fraction of the pixels; 0 if no view shows
    * it.
@@ -16,7 +16,7 @@ export interface SeenSplats {
  * Minimum energy of a splat, as a fraction of that of an unoccluded one, because hidden splats may be visible from
  * other views.
  */
-const LEAST_SHARE = 1 / 64;
+const MIN_SHARE = 1 / 64;
 
 /**
  * Weight of a color error of each splat.
@@ -24,8 +24,11 @@ const LEAST_SHARE = 1 / 64;
  * @param energies [N] of {@link SplatVisibility}.
  * @returns The energies with a lower limit; and the factor that converts estimates to energies.
  */
-export function weighSplats(usual: Float32Array, energies: Float32Array): { weights: Float32Array; unit: number } {
+export function visibilityWeights(
+  usual: Float32Array,
+  energies: Float32Array,
+): { weights: Float32Array; unit: number } {
   const ratios = energies.map((energy, i) => (usual[i] > 0 ? energy / usual[i] : 0)).sort();
   const unit = ratios[ratios.length >> 1] ?? 0;
-  return { weights: energies.map((energy, i) => Math.max(energy, LEAST_SHARE * unit * usual[i])), unit };
+  return { weights: energies.map((energy, i) => Math.max(energy, MIN_SHARE * unit * usual[i])), unit };
 }

@@ -6,7 +6,7 @@ const { CULL_GROUP } = constants;
  * reaches twice as far as the previous one.
  */
 const FIRST_REACH = 8;
-const MOST_SHELLS = 256;
+const MAX_SHELLS = 256;
 
 /** An order of splats in chunks, with its padding. */
 export interface ShellOrder {
@@ -34,7 +34,7 @@ export function shellOrder(positions: Float32Array, kept: Uint32Array): ShellOrd
 function shellsOf(positions: Float32Array, kept: Uint32Array): { shells: Uint8Array; counts: Uint32Array } {
   const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
   const shells = new Uint8Array(kept.length);
-  const counts = new Uint32Array(MOST_SHELLS);
+  const counts = new Uint32Array(MAX_SHELLS);
   for (let k = 0; k < kept.length; k++) {
     let farthest = 0;
     for (let axis = 0; axis < 3; axis++) {
@@ -42,7 +42,7 @@ function shellsOf(positions: Float32Array, kept: Uint32Array): { shells: Uint8Ar
       farthest = Math.max(farthest, Math.abs(positions[3 * kept[k] + axis] - median) / spread);
     }
     const shell = farthest > FIRST_REACH ? Math.ceil(Math.log2(farthest / FIRST_REACH)) : 0;
-    counts[(shells[k] = Math.min(MOST_SHELLS - 1, shell))]++;
+    counts[(shells[k] = Math.min(MAX_SHELLS - 1, shell))]++;
   }
   return { shells, counts };
 }
@@ -51,7 +51,7 @@ function shellsOf(positions: Float32Array, kept: Uint32Array): { shells: Uint8Ar
  * Concatenates shells; if one starts within a chunk of a shell other than the previous one, that chunk is padded first.
  */
 function filledUp(kept: Uint32Array, shells: Uint8Array, counts: Uint32Array): ShellOrder {
-  const starts = new Uint32Array(MOST_SHELLS);
+  const starts = new Uint32Array(MAX_SHELLS);
   const fillers: number[] = [];
   // The innermost shell of the open chunk.
   let [end, open, innermost] = [0, 0, 0];

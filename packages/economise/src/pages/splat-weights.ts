@@ -1,5 +1,5 @@
 import { FACTOR_NUMBERS, rowLengths, type SplatLevel } from '@gaussian-splat/renderer/tools';
-import { weighSplats } from './seen-splats.js';
+import { visibilityWeights } from './seen-splats.js';
 
 /** Rank of the weight, as a fraction of the splats, that defines the first class. */
 const REFERENCE_RANK = 0.9;
@@ -25,7 +25,7 @@ export class SplatWeights {
     this.#leaves = leaves;
     const usual = Float32Array.from({ length: leaves.count }, (_, i) => weightOf(leaves, i));
     const own = energies && usual.map((_, i) => energies[numberOf(leaves, i)]);
-    ({ weights: this.#weights, unit: this.#unit } = own ? weighSplats(usual, own) : { weights: usual, unit: 1 });
+    ({ weights: this.#weights, unit: this.#unit } = own ? visibilityWeights(usual, own) : { weights: usual, unit: 1 });
     this.#reference = this.#weights.slice().sort()[Math.floor(REFERENCE_RANK * (leaves.count - 1))];
   }
 

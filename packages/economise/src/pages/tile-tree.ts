@@ -16,7 +16,7 @@ const { CULL_GROUP } = constants;
  * Builds the tree above copies of another: its finest level has the coarsest chunk of each copy, in the order of
  * `places`.
  */
-export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): DetailTree {
+export function instancedTree(tree: DetailTree, places: readonly Vector3[]): DetailTree {
   const top = tree.levels.length - 1;
   const finest = copiesOf(tree.levels[top], places);
   const levels = [finest, ...levelsAbove(finest)];

@@ -1,5 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { MOST_DROPPED, readScene, splatRanges, type SplatRanges } from '@gaussian-splat/formats';
+import { MAX_DROPPED_RATIO, readScene, splatRanges, type SplatRanges } from '@gaussian-splat/formats';
 import { allocateColumns, closeGaps, type Columns } from './cloud-memory.js';
 import type { PartRead } from './read-part.js';
 import type { Part } from './cloud-memory.js';
@@ -46,7 +46,7 @@ export async function gatherParts(
     read.map((part, k) => ({ first: parts[k].first, count: part.count })),
   );
   const droppedCount = count - kept.count;
-  if (droppedCount > MOST_DROPPED * count) return undefined;
+  if (droppedCount > MAX_DROPPED_RATIO * count) return undefined;
   const antialiased = read.some((part) => part.antialiased);
   return {
     ...kept,

@@ -14,7 +14,7 @@ export interface TaskPool {
   /** Number of tasks that run in parallel. */
   readonly size: number;
   /** Fewer splats than this are processed faster by the calling thread. */
-  readonly leastSplats: number;
+  readonly minSplats: number;
   /** Memory that tasks share with their caller. */
   allocate(byteLength: number): ArrayBufferLike;
   /** Whether tasks can access this memory directly. */
@@ -26,7 +26,7 @@ export interface TaskPool {
 /** Runs one task after another, on this thread. */
 export const inline: TaskPool = {
   size: 1,
-  leastSplats: 0,
+  minSplats: 0,
   allocate: (byteLength) => new ArrayBuffer(byteLength),
   shares: () => true,
   async run<Name extends TaskName>(name: Name, inputs: readonly TaskInput<Name>[]): Promise<TaskResult<Name>[]> {
@@ -37,12 +37,12 @@ export const inline: TaskPool = {
   },
 };
 
-/** Minimum size of a part, as a fraction of {@link TaskPool.leastSplats}. */
-const LEAST_SHARE = 1 / 8;
+/** Minimum size of a part, as a fraction of {@link TaskPool.minSplats}. */
+const MIN_SHARE = 1 / 8;
 
 /** Divides splats into parts of equal size, except the last. Empty without splats. */
-export function partsOf(count: number, { size, leastSplats }: TaskPool): Part[] {
-  const wanted = Math.min(size, Math.floor(count / Math.max(1, LEAST_SHARE * leastSplats)));
+export function partsOf(count: number, { size, minSplats }: TaskPool): Part[] {
+  const wanted = Math.min(size, Math.floor(count / Math.max(1, MIN_SHARE * minSplats)));
   const step = Math.ceil(count / Math.max(1, wanted));
   const parts: Part[] = [];
   for (let first = 0; first < count; first += step) parts.push({ first, end: Math.min(count, first + step) });
@@ -51,5 +51,5 @@ export function partsOf(count: number, { size, leastSplats }: TaskPool): Part[] 
 
 /** Returns the pool, or {@link inline} for work that is too small, or if tasks would receive copies of the arrays. */
 export function poolFor(pool: TaskPool, count: number, arrays: readonly ArrayBufferView[] = []): TaskPool {
-  return count >= pool.leastSplats && arrays.every(({ buffer }) => pool.shares(buffer)) ? pool : inline;
+  return count >= pool.minSplats && arrays.every(({ buffer }) => pool.shares(buffer)) ? pool : inline;
 }

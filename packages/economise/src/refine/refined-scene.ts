@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import type { GaussianScene } from '@gaussian-splat/renderer';
-import type { GaussianPage } from '@gaussian-splat/renderer/tools';
+import type { GaussianBlock } from '@gaussian-splat/renderer/tools';
 import {
   BUFFER_USAGE,
   constants,
@@ -8,7 +8,7 @@ import {
   ingestStage,
   Ingest,
   pageCapacity,
-  recentred,
+  recentered,
   withMemoryCheck,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
@@ -23,12 +23,12 @@ const FLOAT_BYTES = 4;
  * Clamps for parameters without a finite logarithm: beyond these logits opacities are 0 or 1 in float32, and below this
  * scale a splat has no size.
  */
-const MOST_LOGIT = 15;
-const LEAST_SCALE = 1e-20;
+const MAX_LOGIT = 15;
+const MIN_SCALE = 1e-20;
 
 /** A block of splats whose parameters are optimized. */
 export interface RefinedPart {
-  readonly page: GaussianPage;
+  readonly page: GaussianBlock;
   /** Index of its first splat among all, which is a multiple of 256. */
   readonly first: number;
   /** Splats in whole chunks: the stride between rows of `gradients` and `means`. */
@@ -56,7 +56,7 @@ export class RefinedScene implements GaussianScene {
   readonly antialiased: boolean;
   readonly filterVariance: number | undefined;
   readonly origin: GaussianScene['origin'];
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly parts: readonly RefinedPart[];
   /** array<vec2i>: SCREEN_NUMBERS of each splat in fixed point, with every block rounded up to whole chunks. */
   readonly screen: GPUBuffer;
@@ -70,7 +70,7 @@ export class RefinedScene implements GaussianScene {
     device: GPUDevice,
     { cloud, degrees }: Omit<ReducedCloud, 'kept'>,
     memory: GpuMemory,
-    most: number,
+    max: number,
   ) {
     this.#device = device;
     this.#memory = memory;
@@ -86,8 +86,8 @@ export class RefinedScene implements GaussianScene {
     const { storage, copyDestination } = BUFFER_USAGE;
     const parts: RefinedPart[] = [];
     let first = 0;
-    for (let begin = 0; begin < cloud.count; begin += most) {
-      const part = this.#partOf(begin, Math.min(most, cloud.count - begin), first, degrees);
+    for (let begin = 0; begin < cloud.count; begin += max) {
+      const part = this.#partOf(begin, Math.min(max, cloud.count - begin), first, degrees);
       first += part.row;
       parts.push(part);
     }
@@ -101,21 +101,17 @@ export class RefinedScene implements GaussianScene {
   /**
    * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each parameter of a splat, about 1.2 kB at degree 3
    * including the drawn splats.
-   * @param mostSplats Maximum of a block; default: the limits of the device.
+   * @param maxSplats Maximum of a block; default: the limits of the device.
    * @throws GaussianSplatError `out-of-memory/*`
    */
-  static async of(
-    device: GPUDevice,
-    reduced: Omit<ReducedCloud, 'kept'>,
-    mostSplats = Infinity,
-  ): Promise<RefinedScene> {
+  static async of(device: GPUDevice, reduced: Omit<ReducedCloud, 'kept'>, maxSplats = Infinity): Promise<RefinedScene> {
     const memory = new GpuMemory(device);
     const sought = SH_STEP + 3 * shCoefficientCount(reduced.cloud.shDegree);
     const capacity = pageCapacity(device, 2 * FLOAT_BYTES * sought);
-    const most = Math.min(capacity, CULL_GROUP * Math.max(1, Math.floor(mostSplats / CULL_GROUP)));
+    const max = Math.min(capacity, CULL_GROUP * Math.max(1, Math.floor(maxSplats / CULL_GROUP)));
     try {
-      const cloud = recentred(reduced.cloud);
-      const make = (): RefinedScene => new RefinedScene(device, { ...reduced, cloud }, memory, most);
+      const cloud = recentered(reduced.cloud);
+      const make = (): RefinedScene => new RefinedScene(device, { ...reduced, cloud }, memory, max);
       return await withMemoryCheck(device, `${reduced.cloud.count} splats to refine`, make);
     } catch (error) {
       memory.destroy();
@@ -229,9 +225,9 @@ function numbersOf(cloud: GaussianCloud, begin: number, count: number, width: nu
     const logit = Math.log(opacity / (1 - opacity));
     rows.set(cloud.positions.subarray(3 * i, 3 * i + 3), at);
     for (let axis = 0; axis < 3; axis++)
-      rows[at + SCALE_AT + axis] = Math.log(Math.max(LEAST_SCALE, cloud.scales[3 * i + axis]));
+      rows[at + SCALE_AT + axis] = Math.log(Math.max(MIN_SCALE, cloud.scales[3 * i + axis]));
     rows.set(cloud.rotations.subarray(4 * i, 4 * i + 4), at + ROTATION_AT);
-    rows[at + LOGIT_AT] = Math.min(MOST_LOGIT, Math.max(-MOST_LOGIT, logit));
+    rows[at + LOGIT_AT] = Math.min(MAX_LOGIT, Math.max(-MAX_LOGIT, logit));
     rows.set(cloud.sh.subarray((width - SH_AT) * i, (width - SH_AT) * (i + 1)), at + SH_AT);
   }
   return rows;

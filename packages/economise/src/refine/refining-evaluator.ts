@@ -1,15 +1,15 @@
 import { GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import type { Viewpoint } from '@gaussian-splat/renderer';
-import type { SeenSplats } from '../pages/seen-splats.js';
-import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
+import type { SplatVisibility } from '../pages/seen-splats.js';
+import type { CutFigures, Evaluator, EvaluationViews } from '../evaluator.js';
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
-import { PictureErrors } from '../gpu/picture-errors.js';
+import { ImageErrors } from '../gpu/image-errors.js';
 import { exactViewpoint } from '../gpu/show.js';
 import { mean } from '../measure.js';
 import type { Cut, ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
 import { RefinedScene } from './refined-scene.js';
-import { SceneFitter, USUAL_DESCENT, type Descent } from './scene-fitter.js';
+import { SceneFitter, USUAL_DESCENT, type OptimizerOptions } from './scene-fitter.js';
 import { LEFT_BY_REFINING } from './search-refined.js';
 
 export interface RefiningOptions {
@@ -18,7 +18,7 @@ export interface RefiningOptions {
   /** Views of these images: the scoring views. None of them may be a search or held-out view. */
   readonly views: readonly Camera[];
   /** Optimizer options; missing ones have defaults. */
-  readonly descent?: Partial<Descent>;
+  readonly descent?: Partial<OptimizerOptions>;
 }
 
 /**
@@ -29,14 +29,14 @@ export interface RefiningOptions {
 export class RefiningEvaluator implements Evaluator {
   /**
    * Assumed fraction of the error of drops and merges after refinement: merges must be found up to a correspondingly
-   * higher error (`MergingOptions.mostError`).
+   * higher error (`MergingOptions.maxError`).
    */
   static readonly leftByRefining = LEFT_BY_REFINING;
   readonly #inner: Evaluator;
   readonly #cloud: GaussianCloud;
   readonly #options: RefiningOptions;
   readonly #viewpoint: Viewpoint;
-  #pictures: Promise<PictureErrors> | undefined;
+  #images: Promise<ImageErrors> | undefined;
 
   /**
    * @param inner Is destroyed with this one.
@@ -59,7 +59,7 @@ export class RefiningEvaluator implements Evaluator {
     return this.#inner.rank(signal);
   }
 
-  cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+  cut(cut: Cut, views: EvaluationViews, signal?: AbortSignal): Promise<CutFigures> {
     return this.#inner.cut(cut, views, signal);
   }
 
@@ -67,31 +67,31 @@ export class RefiningEvaluator implements Evaluator {
     return this.#inner.reduce(cut, signal);
   }
 
-  async seen(): Promise<SeenSplats | undefined> {
+  async seen(): Promise<SplatVisibility | undefined> {
     return this.#inner.seen?.();
   }
 
-  compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  compare(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     return this.#inner.compare(cloud, views, signal);
   }
 
-  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+  sketch(cloud: GaussianCloud, views: EvaluationViews, signal?: AbortSignal): Promise<readonly number[]> {
     return this.#inner.sketch(cloud, views, signal);
   }
 
   async refine(reduced: ReducedCloud, signal?: AbortSignal): Promise<ReducedCloud> {
     const { device, descent } = this.#options;
-    const pictures = await (this.#pictures ??= this.#draw());
+    const images = await (this.#images ??= this.#draw());
     signal?.throwIfAborted();
     // There is no reference to fit.
-    if (pictures.covered.every((pixels) => pixels === 0)) return reduced;
+    if (images.covered.every((pixels) => pixels === 0)) return reduced;
     const scene = await RefinedScene.of(device, reduced);
     try {
-      const fitter = new SceneFitter(device, this.#viewpoint, scene, pictures);
+      const fitter = new SceneFitter(device, this.#viewpoint, scene, images);
       try {
         const before = await fitter.fit({ ...USUAL_DESCENT, ...descent }, signal);
         // Too few or too large steps may increase the error.
-        if (mean(await pictures.measure(scene)) >= mean(before)) return reduced;
+        if (mean(await images.measure(scene)) >= mean(before)) return reduced;
       } finally {
         fitter.destroy();
       }
@@ -104,17 +104,17 @@ export class RefiningEvaluator implements Evaluator {
   destroy(): void {
     this.#inner.destroy();
     this.#viewpoint.destroy();
-    void this.#pictures?.then(
-      (pictures) => pictures.destroy(),
+    void this.#images?.then(
+      (images) => images.destroy(),
       () => undefined,
     );
   }
 
-  async #draw(): Promise<PictureErrors> {
+  async #draw(): Promise<ImageErrors> {
     const { device, views } = this.#options;
     const whole = await CloudBuffers.upload(device, this.#cloud);
     try {
-      return await PictureErrors.of(device, this.#viewpoint, whole, views);
+      return await ImageErrors.of(device, this.#viewpoint, whole, views);
     } finally {
       whole.destroy();
     }

@@ -19,7 +19,7 @@ import {
   SCREEN_NUMBERS,
 } from '../generated/shaders.js';
 import { layouts, NO_VIEW } from '../gpu/layouts.js';
-import type { PictureErrors } from '../gpu/picture-errors.js';
+import type { ImageErrors } from '../gpu/image-errors.js';
 import { show } from '../gpu/show.js';
 import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';
@@ -49,7 +49,7 @@ export interface Rates {
 }
 
 /** Options of the optimizer. */
-export interface Descent {
+export interface OptimizerOptions {
   readonly steps: number;
   /** Views in each step. */
   readonly viewsAtOnce: number;
@@ -62,7 +62,7 @@ export interface Descent {
   /**
    * Epsilon of Adam: derivatives of the squared error, summed over the pixels of an image, far below it change little.
    */
-  readonly least: number;
+  readonly epsilon: number;
   /**
    * Limit of a step as a fraction of Newton's step along one parameter, with the largest curvature in any view. Adam
    * takes steps of the same length for small derivatives: they would move a splat that fills one view and is barely
@@ -71,8 +71,8 @@ export interface Descent {
   readonly newton: number;
 }
 
-export const USUAL_DESCENT: Descent = {
-  ...{ steps: 2592, viewsAtOnce: 1, lastRate: 0.03, keepMean: 0.9, keepSquare: 0.99, least: 1e-8, newton: 0.3 },
+export const USUAL_DESCENT: OptimizerOptions = {
+  ...{ steps: 2592, viewsAtOnce: 1, lastRate: 0.03, keepMean: 0.9, keepSquare: 0.99, epsilon: 1e-8, newton: 0.3 },
   rates: { position: 0.003, growth: 0.003, turn: 0.003, logit: 0.02, constant: 0.005, harmonic: 0.001 },
 };
 
@@ -81,14 +81,14 @@ export class SceneFitter {
   readonly #device: GPUDevice;
   readonly #viewpoint: Viewpoint;
   readonly #scene: RefinedScene;
-  readonly #errors: PictureErrors;
+  readonly #errors: ImageErrors;
   readonly #memory: GpuMemory;
   readonly #views: GPUBuffer;
   readonly #refineViews: GPUBuffer;
   readonly #steps: readonly GPUBuffer[];
 
   /** @param errors The reference images. */
-  constructor(device: GPUDevice, viewpoint: Viewpoint, scene: RefinedScene, errors: PictureErrors) {
+  constructor(device: GPUDevice, viewpoint: Viewpoint, scene: RefinedScene, errors: ImageErrors) {
     this.#device = device;
     this.#viewpoint = viewpoint;
     this.#scene = scene;
@@ -102,11 +102,11 @@ export class SceneFitter {
   }
 
   /** Runs the optimizer steps. @returns [views] initial errors */
-  async fit(descent: Descent, signal?: AbortSignal): Promise<readonly number[]> {
+  async fit(descent: OptimizerOptions, signal?: AbortSignal): Promise<readonly number[]> {
     const { steps, viewsAtOnce, lastRate } = descent;
     // Draws all views until the scene fits the viewpoint's capacity, because missing splats give wrong derivatives.
     const before = await this.#errors.measure(this.#scene);
-    const pace = Math.min(1, Math.sqrt(mean(before) / USUAL_ERROR));
+    const rateScale = Math.min(1, Math.sqrt(mean(before) / USUAL_ERROR));
     const order = viewOrder(this.#errors.exhibits.length);
     await this.#survey(signal);
     let looks = 0;
@@ -116,7 +116,7 @@ export class SceneFitter {
         this.look(order[looks % order.length]);
         if (looks % AHEAD === AHEAD - 1) await this.#device.queue.onSubmittedWorkDone();
       }
-      this.#step(step + 1, pace * lastRate ** (step / steps), descent);
+      this.#step(step + 1, rateScale * lastRate ** (step / steps), descent);
     }
     await this.#device.queue.onSubmittedWorkDone();
     return before;
@@ -128,15 +128,15 @@ export class SceneFitter {
     const image = this.#errors.targetOf(camera);
     show(this.#viewpoint, this.#scene);
     this.#viewpoint.draw(camera, { target: image, auxiliary: AUXILIARY });
-    const noted = this.#viewpoint.auxiliary;
-    if (noted === undefined) return;
+    const auxiliary = this.#viewpoint.auxiliary;
+    if (auxiliary === undefined) return;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.look' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.look' });
     const backward = rareKernelOf(this.#device, refineBackward);
-    const { view: tiles, splats, pairs, tile_bits, ranges, survivors } = noted;
+    const { view: tiles, splats, pairs, tile_bits, ranges, survivors } = auxiliary;
     const painted = { view: tiles, splats, pairs, tile_bits, ranges, survivors };
-    const pictures = { image: image.createView(), reference: reference.createView() };
-    const bindings = backward.bind({ ...painted, ...pictures, screen: this.#scene.screen });
+    const images = { image: image.createView(), reference: reference.createView() };
+    const bindings = backward.bind({ ...painted, ...images, screen: this.#scene.screen });
     backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / PATCH), Math.ceil(camera.height / PATCH));
     const chain = rareKernelOf(this.#device, refineChain);
     this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients, bends }, p) => {
@@ -171,7 +171,7 @@ export class SceneFitter {
   }
 
   /** @param number Of the step, from 1 on. @param share Remaining fraction of the rates. */
-  #step(number: number, share: number, { rates, keepMean, keepSquare, least, newton }: Descent): void {
+  #step(number: number, share: number, { rates, keepMean, keepSquare, epsilon, newton }: OptimizerOptions): void {
     const kernel = rareKernelOf(this.#device, refineStep);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.step' });
@@ -181,7 +181,7 @@ export class SceneFitter {
         layouts.RefineStep,
         {
           ...{ splat_count: page.count, row, harmonics: 3 * shCoefficientCount(this.#scene.shDegree) },
-          ...{ keep_mean: keepMean, keep_square: keepSquare, least, newton },
+          ...{ keep_mean: keepMean, keep_square: keepSquare, epsilon, newton },
           mean_scale: 1 / (1 - keepMean ** number),
           square_scale: 1 / (1 - keepSquare ** number),
           ...{ position_rate: share * rates.position, growth_rate: share * rates.growth },

@@ -16,7 +16,7 @@ const NEAR_ENOUGH = 0.97;
 /** Ratio between a cut that fits and one that does not, below which the search ends. */
 const NARROW = 1.03;
 /** Range of the exponent of the error as a function of the budget: estimates from two tries outside it are noise. */
-const [LEAST_SLOPE, MOST_SLOPE] = [0.5, 2];
+const [MIN_SLOPE, MAX_SLOPE] = [0.5, 2];
 
 /** Size of the cut, and whether to refine it. */
 export interface Plan {
@@ -98,7 +98,7 @@ function bracketOf(tried: readonly Tried[], budget: number): [number, number] {
 function nextFilling(tried: readonly Tried[], budget: number): number {
   const [last, before] = [tried[tried.length - 1], tried[tried.length - 2]];
   const measured = before && Math.log(last.error / before.error) / Math.log(last.filling / before.filling);
-  const slope = Math.min(MOST_SLOPE, Math.max(LEAST_SLOPE, measured ?? 1));
+  const slope = Math.min(MAX_SLOPE, Math.max(MIN_SLOPE, measured ?? 1));
   const guess = last.filling * ((0.985 * budget) / last.error) ** (1 / slope);
   const [fits, fails] = bracketOf(tried, budget);
   if (guess > fits && guess < fails) return guess;

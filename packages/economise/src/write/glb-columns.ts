@@ -45,7 +45,7 @@ export function glbColumns(columns: Columns, degree: number): GlbColumn[] {
     },
   });
   const stride = 3 * shCoefficientCount(shDegree);
-  const colours = [0, 1, 2, 3].slice(0, degree + 1).flatMap((band) =>
+  const colors = [0, 1, 2, 3].slice(0, degree + 1).flatMap((band) =>
     Array.from({ length: 2 * band + 1 }, (_, k) => {
       const n = band * band + k;
       return plain(`SH_DEGREE_${band}_COEF_${k}`, sh, stride, 3 * n, 3, HALF_TURN[n]);
@@ -59,7 +59,7 @@ export function glbColumns(columns: Columns, degree: number): GlbColumn[] {
     },
     plain('SCALE', scales, 3, 0, 3),
     plain('OPACITY', opacities, 1, 0, 1),
-    ...colours,
+    ...colors,
   ];
 }
 
@@ -79,13 +79,13 @@ function putPlaces(positions: Float32Array, out: Numbers, splats: Uint32Array): 
 export function placeBounds({ positions }: Columns, splats: Uint32Array): object {
   const [min, max] = [new Array<number>(3), new Array<number>(3)];
   for (let axis = 0; axis < 3; axis++) {
-    let [least, most] = [Infinity, -Infinity];
+    let [lowest, highest] = [Infinity, -Infinity];
     for (let n = 0; n < splats.length; n++) {
       const place = PLACE_SIGNS[axis] * positions[3 * splats[n] + axis];
-      if (place < least) least = place;
-      if (place > most) most = place;
+      if (place < lowest) lowest = place;
+      if (place > highest) highest = place;
     }
-    [min[axis], max[axis]] = [least, most];
+    [min[axis], max[axis]] = [lowest, highest];
   }
   return { min, max };
 }

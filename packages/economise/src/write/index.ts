@@ -1,6 +1,6 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { isOfPlanes } from '@gaussian-splat/renderer/stages';
-import type { SeenSplats } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/seen-splats.js';
 import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
@@ -34,7 +34,7 @@ export interface Encoding {
    * @param measure Returns the mean squared error.
    * @param seen Visibility of the splats of the scene, if known.
    */
-  readonly tune?: (whole: WrittenCloud, measure: Measure, target: number, seen?: SeenSplats) => Promise<Encoding>;
+  readonly tune?: (whole: WrittenCloud, measure: Measure, target: number, seen?: SplatVisibility) => Promise<Encoding>;
 }
 
 /** Returns the mean squared error of a written file against the scene, peak 1. */

@@ -1,17 +1,17 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { roundedBy, SeenRounder } from '../pages/round-harmonics.js';
-import { weighSplats, type SeenSplats } from '../pages/seen-splats.js';
+import { roundedBy, ShQuantizer } from '../pages/round-harmonics.js';
+import { visibilityWeights, type SplatVisibility } from '../pages/seen-splats.js';
 import type { Palette } from './palette.js';
 
 /**
  * The code of 0 in the palette; codes within {@link EVEN_CODES} of it are evenly spaced, and the largest is at most
- * {@link MOST_BENT} steps.
+ * {@link MAX_BENT_CODE} steps.
  */
-const [MIDDLE_CODE, EVEN_CODES, MOST_BENT] = [127, 48, 2000];
+const [MIDDLE_CODE, EVEN_CODES, MAX_BENT_CODE] = [127, 48, 2000];
 /**
  * Rank of the weight, as a fraction of the entries, that gets the usual step, and the maximum octaves of larger steps.
  */
-const [REFERENCE_RANK, MOST_OCTAVES] = [0.9, 5];
+const [REFERENCE_RANK, MAX_OCTAVES] = [0.9, 5];
 /** Digits of the values of a codebook: more take more bytes, and are finer than any step. */
 export const DIGITS = 6;
 
@@ -27,7 +27,7 @@ export interface RoundedPalette {
 /** Quantizes palette entries, each according to its visibility, optimized for the most visible splat that uses it. */
 export function roundPalette(
   { entries, labels, size }: Palette,
-  targets: { order: Uint32Array; weights: Float32Array; seen: SeenSplats | undefined; step: number },
+  targets: { order: Uint32Array; weights: Float32Array; seen: SplatVisibility | undefined; step: number },
 ): RoundedPalette {
   const { order, weights, seen, step } = targets;
   const width = entries.length / size;
@@ -44,17 +44,17 @@ export function roundPalette(
   });
   const reference = sums.slice().sort()[Math.floor(REFERENCE_RANK * (size - 1))];
   const octaves = Uint8Array.from(sums, (sum) =>
-    Math.min(MOST_OCTAVES, Math.max(0, Math.round(Math.log2(reference / Math.max(1e-36, sum)) / 2))),
+    Math.min(MAX_OCTAVES, Math.max(0, Math.round(Math.log2(reference / Math.max(1e-36, sum)) / 2))),
   );
   // Neighbors in the image with equal steps have common codes.
   const numbers = new Uint32Array(size);
   met.sort((a, b) => octaves[a] - octaves[b]).forEach((entry, number) => (numbers[entry] = number));
   const scale = new CodeScale(
     step,
-    entries.reduce((most, value) => Math.max(most, Math.abs(value)), 0),
+    entries.reduce((max, value) => Math.max(max, Math.abs(value)), 0),
   );
   const codes = new Uint8Array(entries.length);
-  const rounder = new SeenRounder(width / 3 + 1, seen);
+  const rounder = new ShQuantizer(width / 3 + 1, seen);
   for (let entry = 0; entry < size; entry++) {
     const unit = 2 ** octaves[entry];
     const [from, to] = [width * entry, width * numbers[entry]];
@@ -82,9 +82,9 @@ class CodeScale {
   readonly #step: number;
   readonly #bend: number;
 
-  constructor(step: number, most: number) {
-    this.#step = Math.max(step, most / MOST_BENT);
-    this.#bend = Math.max(0, most / this.#step - MIDDLE_CODE) / (MIDDLE_CODE - EVEN_CODES) ** 2;
+  constructor(step: number, max: number) {
+    this.#step = Math.max(step, max / MAX_BENT_CODE);
+    this.#bend = Math.max(0, max / this.#step - MIDDLE_CODE) / (MIDDLE_CODE - EVEN_CODES) ** 2;
   }
 
   valueOf(code: number): number {
@@ -105,7 +105,7 @@ class CodeScale {
 export function weightsOf(
   { opacities, scales }: GaussianCloud,
   order: Uint32Array,
-  seen: SeenSplats | undefined,
+  seen: SplatVisibility | undefined,
 ): Float32Array {
   const usual = Float32Array.from(order, (i) => {
     const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
@@ -113,7 +113,7 @@ export function weightsOf(
     return opacities[i] ** 2 * (Math.max(a * b, b * c, a * c) + 1e-20);
   });
   return seen
-    ? weighSplats(
+    ? visibilityWeights(
         usual,
         Float32Array.from(order, (i) => seen.energies[i]),
       ).weights
@@ -129,7 +129,7 @@ export function addedBy(
   of: (k: number, n: number) => number,
   order: Uint32Array,
   width: number,
-  seen: SeenSplats | undefined,
+  seen: SplatVisibility | undefined,
 ): Float32Array {
   const added = new Float32Array(3 * order.length);
   if (!seen?.roots.length) return added;

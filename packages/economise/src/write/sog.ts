@@ -1,7 +1,7 @@
 import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
-import type { SeenSplats } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/seen-splats.js';
 import type { Steps } from '../steps.js';
 import { findPalette, type Palette } from './palette.js';
 import { addedBy, DIGITS, roundPalette, weightsOf } from './sog-palette.js';
@@ -37,17 +37,17 @@ export interface SogOptions {
    * Visibility of the cloud's splats: harmonics of less visible ones get a less accurate palette entry. Default:
    * estimated from opacities and sizes.
    */
-  readonly seen?: SeenSplats | undefined;
+  readonly seen?: SplatVisibility | undefined;
   /** See {@link EncodeWebp}; default 0.7: 1 takes twenty times as long, for 1 % less. */
   readonly effort?: number;
 }
 
 const USUAL_EFFORT = 0.7;
 /** Resolution of SOG. */
-const MOST_PLACES = 65_535;
+const MAX_PLACES = 65_535;
 const PALETTE_ROW = 64;
 /** Codes of a codebook; smaller steps are enlarged to fit. */
-const MOST_CODES = 255;
+const MAX_CODES = 255;
 const LN2 = Math.LN2;
 
 /** Writes SOG version 2 as a bundle. A scene with an up direction other than (0, -1, 0) is rotated. */
@@ -145,13 +145,13 @@ function putMeans(
   const whole = Math.max(1, Math.round(step));
   for (let axis = 0; axis < 3; axis++) {
     const values = Float64Array.from(order, (i) => logPlace(positions[3 * i + axis] + origin[axis]));
-    const low = values.reduce((least, value) => Math.min(least, value), Infinity);
-    const high = values.reduce((most, value) => Math.max(most, value), -Infinity);
+    const low = values.reduce((min, value) => Math.min(min, value), Infinity);
+    const high = values.reduce((max, value) => Math.max(max, value), -Infinity);
     mins.push(low);
     maxs.push(high);
-    const scale = high > low ? MOST_PLACES / (high - low) : 0;
+    const scale = high > low ? MAX_PLACES / (high - low) : 0;
     values.forEach((value, k) => {
-      codes[3 * k + axis] = Math.min(MOST_PLACES, whole * Math.round(((value - low) * scale) / whole));
+      codes[3 * k + axis] = Math.min(MAX_PLACES, whole * Math.round(((value - low) * scale) / whole));
     });
   }
   const byte = (shift: number) => (k: number, c: number) => (c < 3 ? (codes[3 * k + c] >> shift) & 255 : 255);
@@ -197,8 +197,8 @@ function codebook(
       high = Math.max(high, value);
     }
   }
-  const spacing = Math.max(step, (high - low) / MOST_CODES) || 1;
-  const count = Math.min(MOST_CODES, Math.ceil((high - low) / spacing)) + 1;
+  const spacing = Math.max(step, (high - low) / MAX_CODES) || 1;
+  const count = Math.min(MAX_CODES, Math.ceil((high - low) / spacing)) + 1;
   const codes = new Uint8Array(width * length);
   for (let n = 0; n < length; n++) {
     for (let k = 0; k < width; k++) {

@@ -7,10 +7,10 @@ export interface SpzOptions {
   readonly shBits: number;
 }
 
-const COLOUR_SCALE = 0.15;
+const COLOR_SCALE = 0.15;
 const MAX_FRACTIONAL_BITS = 20;
 /** The largest 24-bit coordinate, in steps. */
-const MOST_STEPS = 2 ** 23 - 1;
+const MAX_STEPS = 2 ** 23 - 1;
 
 /**
  * The coordinate system of a cloud, which current converters keep and expect: right, down, forward is system 6 of the
@@ -40,7 +40,7 @@ export async function writeSpz(given: GaussianCloud, options: SpzOptions): Promi
   body.set([shDegree, fractionalBits, (antialiased ? FLAG_ANTIALIASED : 0) | FLAG_EXTENSIONS, 0], 12);
   let at = 16;
   at = packPositions(cloud, 2 ** fractionalBits, body, at);
-  at = packColours(cloud, body, at);
+  at = packColors(cloud, body, at);
   for (const scale of cloud.scales) body[at++] = byte(16 * (Math.log(scale) + 10));
   for (let i = 0; i < count; i++, at += 4) view.setUint32(at, packRotation(cloud.rotations, 4 * i), true);
   at = packHarmonics(cloud, options.shBits, body, at);
@@ -57,7 +57,7 @@ const byte = (value: number): number => Math.min(255, Math.max(0, Math.round(val
 export function fractionalBitsOf({ positions, origin }: Pick<GaussianCloud, 'positions' | 'origin'>): number {
   let largest = 1e-9;
   positions.forEach((value, k) => (largest = Math.max(largest, Math.abs(value + origin[k % 3]))));
-  if (largest <= MOST_STEPS) return Math.min(MAX_FRACTIONAL_BITS, Math.floor(Math.log2(MOST_STEPS / largest)));
+  if (largest <= MAX_STEPS) return Math.min(MAX_FRACTIONAL_BITS, Math.floor(Math.log2(MAX_STEPS / largest)));
   throw new GaussianSplatError('argument/value', {
     where: 'positions of a scene that is written as SPZ',
     expected: 'coordinates of at most 8,388,607, which is what 24 bits hold',
@@ -74,11 +74,11 @@ function packPositions({ positions, origin }: GaussianCloud, unit: number, out: 
   return at + 3 * positions.length;
 }
 
-function packColours({ count, opacities, sh, shDegree }: GaussianCloud, out: Uint8Array, at: number): number {
+function packColors({ count, opacities, sh, shDegree }: GaussianCloud, out: Uint8Array, at: number): number {
   const stride = 3 * shCoefficientCount(shDegree);
   for (let i = 0; i < count; i++) out[at++] = byte(255 * opacities[i]);
   for (let i = 0; i < count; i++) {
-    for (let k = 0; k < 3; k++) out[at++] = byte(255 * (0.5 + COLOUR_SCALE * sh[stride * i + k]));
+    for (let k = 0; k < 3; k++) out[at++] = byte(255 * (0.5 + COLOR_SCALE * sh[stride * i + k]));
   }
   return at;
 }

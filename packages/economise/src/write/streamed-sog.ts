@@ -1,7 +1,7 @@
 import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
 import { upright } from '@gaussian-splat/formats';
 import { packedOrder } from '@gaussian-splat/renderer/tools';
-import { buildLevels, recentred, type SplatLevel } from '@gaussian-splat/renderer/stages';
+import { buildLevels, recentered, type SplatLevel } from '@gaussian-splat/renderer/stages';
 import { nothingToWrite, sogFiles, type SogOptions } from './sog.js';
 
 /** Name of the index. */
@@ -15,8 +15,8 @@ const KEPT = 4;
  * Minimum number of levels of a scene with enough splats, and the maximum number of splats over all coarsest levels:
  * more would delay the first frame.
  */
-const LEAST_LEVELS = 4;
-const MOST_COARSEST = 40_000;
+const MIN_LEVELS = 4;
+const MAX_COARSEST_CHUNKS = 40_000;
 /** Maximum number of splats in a file, which has to be complete before any of it is shown. */
 const FILE_SPLATS = 131_072;
 
@@ -44,7 +44,7 @@ export async function writeStreamedSog(
   given: GaussianCloud,
   options: SogOptions,
 ): Promise<ReadonlyMap<string, Uint8Array>> {
-  const cloud = recentred(upright(given));
+  const cloud = recentered(upright(given));
   const order = packedOrder(cloud);
   if (order.length === 0) throw nothingToWrite();
   const boxes = boxesOf(cloud, order);
@@ -83,9 +83,9 @@ export async function writeStreamedSog(
 
 /** Boxes with equally many splats, within one, so that all have the same levels. */
 function boxesOf(cloud: GaussianCloud, order: Uint32Array): Box[] {
-  let most = CHUNK * KEPT ** (LEAST_LEVELS - 1);
-  while ((order.length * CHUNK) / most > MOST_COARSEST) most *= KEPT;
-  const count = Math.ceil(order.length / most);
+  let max = CHUNK * KEPT ** (MIN_LEVELS - 1);
+  while ((order.length * CHUNK) / max > MAX_COARSEST_CHUNKS) max *= KEPT;
+  const count = Math.ceil(order.length / max);
   return Array.from({ length: count }, (_, box) => {
     const [first, end] = [box, box + 1].map((k) => Math.floor((k * order.length) / count));
     const kept = order.slice(first, end);
@@ -133,7 +133,7 @@ function cloudOf(levels: readonly SplatLevel[], like: GaussianCloud): GaussianCl
     level.readSh(0, level.count, sh.subarray(stride * at));
     for (let i = 0; i < level.count; i++, at++) {
       const { values, vectors } = symmetricEigen(covarianceOf(level.factors, 6 * i));
-      for (let n = 0; n < 3; n++) scales[3 * at + n] = Math.sqrt(Math.max(LEAST_VARIANCE, values[n]));
+      for (let n = 0; n < 3; n++) scales[3 * at + n] = Math.sqrt(Math.max(MIN_VARIANCE, values[n]));
       rotations.set(quaternionOfMatrix(vectors), 4 * at);
       opacities[at] = Math.min(1, level.opacities[i]);
     }
@@ -142,7 +142,7 @@ function cloudOf(levels: readonly SplatLevel[], like: GaussianCloud): GaussianCl
 }
 
 /** A float32 can hold its square root. */
-const LEAST_VARIANCE = 1e-36;
+const MIN_VARIANCE = 1e-36;
 
 /** @param factors Lower triangular roots: xx, yx, yy, zx, zy, zz. */
 function covarianceOf(factors: Float32Array, at: number): number[] {

@@ -1,5 +1,5 @@
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
-import type { SeenSplats } from '../pages/seen-splats.js';
+import type { SplatVisibility } from '../pages/seen-splats.js';
 import { findSteps, scaledSteps } from '../steps.js';
 import type { Encoding, Measure, WrittenCloud } from './index.js';
 import type { Palette } from './palette.js';
@@ -62,7 +62,7 @@ async function tuned(
   measure: Measure,
   target: number,
   encodeWebp: EncodeWebp,
-  seen: SeenSplats | undefined,
+  seen: SplatVisibility | undefined,
 ): Promise<SogOptions> {
   const palettes = new Map<number, Palette>();
   const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
@@ -76,8 +76,8 @@ async function tuned(
       if (error <= PALETTE_SHARE * target) break;
     }
   }
-  const least = (1 - PALETTE_SHARE) * target * 0.25;
-  const share = cloud.shDegree > 0 ? Math.max(least, rest) : target;
+  const min = (1 - PALETTE_SHARE) * target * 0.25;
+  const share = cloud.shDegree > 0 ? Math.max(min, rest) : target;
   const ofPalette = 1.5 * (shCoefficientCount(cloud.shDegree) - 1) * Math.min(1, palette / cloud.count);
   const numbers = ofPalette > 0 ? { ...NUMBERS, harmonics: ofPalette } : NUMBERS;
   const { steps } = await findSteps({
@@ -88,7 +88,7 @@ async function tuned(
 }
 
 /** Visibility of some of the splats. */
-function splatsSeen({ energies, roots }: SeenSplats, kept: Uint32Array): SeenSplats {
+function splatsSeen({ energies, roots }: SplatVisibility, kept: Uint32Array): SplatVisibility {
   const numbers = roots.length / energies.length;
   const own = new Float32Array(numbers * kept.length);
   kept.forEach((i, k) => own.set(roots.subarray(numbers * i, numbers * (i + 1)), numbers * k));

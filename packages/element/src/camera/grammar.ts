@@ -7,7 +7,7 @@ import type { Vector3 } from '@gaussian-splat/core';
  */
 
 /** A length in meters (one world unit is one meter) or a multiple of the radius that frames the scene. */
-export type RadiusSetting = { readonly metres: number } | { readonly framings: number } | 'auto';
+export type RadiusSetting = { readonly meters: number } | { readonly framings: number } | 'auto';
 /** Radians. */
 export type AngleSetting = number | 'auto';
 
@@ -59,16 +59,16 @@ function parseAngle(term: string): AngleSetting | null {
 function parseLength(term: string): number | 'auto' | null {
   if (term === 'auto') return 'auto';
   const quantity = parseQuantity(term);
-  const metres = quantity === null ? undefined : METRES_PER_UNIT[quantity.unit];
-  return quantity === null || metres === undefined ? null : quantity.value * metres;
+  const meters = quantity === null ? undefined : METRES_PER_UNIT[quantity.unit];
+  return quantity === null || meters === undefined ? null : quantity.value * meters;
 }
 
 function parseRadius(term: string): RadiusSetting | null {
   const quantity = parseQuantity(term);
   if (quantity?.unit === '%') return quantity.value > 0 ? { framings: quantity.value / 100 } : null;
-  const metres = parseLength(term);
-  if (metres === null || metres === 'auto') return metres;
-  return metres > 0 ? { metres } : null;
+  const meters = parseLength(term);
+  if (meters === null || meters === 'auto') return meters;
+  return meters > 0 ? { meters } : null;
 }
 
 const terms = (text: string): string[] => text.trim().toLowerCase().split(/\s+/);

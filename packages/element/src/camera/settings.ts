@@ -50,7 +50,7 @@ const angle = (setting: AngleSetting, auto: number): number => (setting === 'aut
 
 function distance(setting: RadiusSetting, auto: number, framing: number): number {
   if (setting === 'auto') return auto;
-  return 'metres' in setting ? setting.metres : setting.framings * framing;
+  return 'meters' in setting ? setting.meters : setting.framings * framing;
 }
 
 /** Returns the pose for the attributes. `aspect` is width / height of the frame. */
@@ -83,8 +83,8 @@ export function limitsOf(
   const { minOrbit, maxOrbit } = settings;
   const pose = poseOf(settings, bounds, aspect);
   const poses = [pose, asked ?? pose];
-  const least = (auto: number, key: keyof CameraPose): number => Math.min(auto, ...poses.map((each) => each[key]));
-  const most = (auto: number, key: keyof CameraPose): number => Math.max(auto, ...poses.map((each) => each[key]));
+  const min = (auto: number, key: keyof CameraPose): number => Math.min(auto, ...poses.map((each) => each[key]));
+  const max = (auto: number, key: keyof CameraPose): number => Math.max(auto, ...poses.map((each) => each[key]));
   const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);
   const place = (setting: TargetSetting, auto: number): Pick<CameraPose, 'x' | 'y' | 'z'> => {
     const [x, y, z] = setting.map((value) => (value === 'auto' ? auto : value));
@@ -93,17 +93,17 @@ export function limitsOf(
   return {
     min: {
       theta: angle(minOrbit.theta, -Infinity),
-      phi: Math.max(0, angle(minOrbit.phi, least(AUTO.minPhi, 'phi'))),
-      radius: distance(minOrbit.radius, least(AUTO.minFramings * framing, 'radius'), framing),
+      phi: Math.max(0, angle(minOrbit.phi, min(AUTO.minPhi, 'phi'))),
+      radius: distance(minOrbit.radius, min(AUTO.minFramings * framing, 'radius'), framing),
       ...place(settings.minTarget, -Infinity),
-      fieldOfView: angle(settings.minFieldOfView, least(AUTO.minFieldOfView, 'fieldOfView')),
+      fieldOfView: angle(settings.minFieldOfView, min(AUTO.minFieldOfView, 'fieldOfView')),
     },
     max: {
       theta: angle(maxOrbit.theta, Infinity),
-      phi: Math.min(Math.PI, angle(maxOrbit.phi, most(AUTO.maxPhi, 'phi'))),
-      radius: distance(maxOrbit.radius, most(AUTO.maxFramings * framing, 'radius'), framing),
+      phi: Math.min(Math.PI, angle(maxOrbit.phi, max(AUTO.maxPhi, 'phi'))),
+      radius: distance(maxOrbit.radius, max(AUTO.maxFramings * framing, 'radius'), framing),
       ...place(settings.maxTarget, Infinity),
-      fieldOfView: angle(settings.maxFieldOfView, most(AUTO.maxFieldOfView, 'fieldOfView')),
+      fieldOfView: angle(settings.maxFieldOfView, max(AUTO.maxFieldOfView, 'fieldOfView')),
     },
   };
 }

@@ -34,7 +34,7 @@ export interface ChildPlace {
 
 /** Convention of glTF. */
 const UP: Vector3 = [0, 1, 0];
-const NO_VALUES: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
+const NO_VALUES: Omit<DynamicState, 'timeSeconds'> = { pose: undefined, controls: {}, images: {} };
 
 /** Events of a child of `<gaussian-splat>`, with the same meanings as there. Only those of pointers bubble. */
 export type ChildEventMap = Record<

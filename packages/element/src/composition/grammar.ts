@@ -46,6 +46,6 @@ export const boxGrammar: AttributeGrammar<readonly number[] | undefined> = {
     if (text === 'none') return undefined;
     const each = terms(text);
     const [min, max] = [parsePoint(each.slice(0, 3).join(' ')), parsePoint(each.slice(3).join(' '))];
-    return min && max && min.every((least, axis) => least <= max[axis]) ? [...min, ...max] : null;
+    return min && max && min.every((lowest, axis) => lowest <= max[axis]) ? [...min, ...max] : null;
   },
 };

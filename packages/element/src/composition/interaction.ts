@@ -5,7 +5,7 @@ import { css, type ReactiveControllerHost } from 'lit';
 import { project } from '../camera/projection.js';
 import type { PickedPoint } from '../camera/values.js';
 import { adoptStyles } from '../styles.js';
-import { word, type SpokenStrings } from '../words.js';
+import { word, type A11yStrings } from '../words.js';
 import { SplatChild } from './child.js';
 
 /** Interface of the element for clicks on children. */
@@ -15,7 +15,7 @@ export interface InteractionHost {
   /** The camera of the last frame. */
   readonly drawnFrom: Camera | undefined;
   readonly isOnShow: boolean;
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   positionFromPoint(clientX: number, clientY: number): Promise<PickedPoint | null>;
 }
 

@@ -1,10 +1,10 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { viewSentence, type ViewName } from '../camera/spoken.js';
-import type { SpokenStrings } from '../words.js';
+import type { A11yStrings } from '../words.js';
 
 export interface AnnouncerHost {
   readonly viewName: ViewName;
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   /** Whether the frame has keyboard focus. */
   readonly isFocused: boolean;
 }

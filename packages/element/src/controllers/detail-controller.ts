@@ -10,12 +10,12 @@ import type { Services } from '../element-host.js';
  * Minimum number of splats for building levels automatically: in smaller scenes the number of splats is not the
  * bottleneck.
  */
-const LEAST_SPLATS = 50_000;
+const MIN_SPLATS = 50_000;
 /**
  * Maximum number of splats for building them automatically: all of them are read back and merged in CPU memory, about
  * 150 bytes each.
  */
-const MOST_SPLATS = 8_000_000;
+const MAX_SPLATS = 8_000_000;
 /**
  * Duration of motion at reduced quality before levels are built, ms: the first frames of a scene, and those after a
  * rest, are often slow.
@@ -51,7 +51,7 @@ export class DetailController {
   /** Accumulated motion at reduced quality, ms. */
   #slowMs = 0;
   /** Time of the last reported frame in motion. */
-  #noted = 0;
+  #sampledAt = 0;
 
   constructor(host: DetailHost) {
     this.#host = host;
@@ -70,8 +70,8 @@ export class DetailController {
 
   /** Reports each frame in motion, and whether it was drawn at full quality. */
   reportMotionFrame(isWhole: boolean): void {
-    const gap = performance.now() - this.#noted;
-    this.#noted += gap;
+    const gap = performance.now() - this.#sampledAt;
+    this.#sampledAt += gap;
     if (isWhole) this.#slowMs = 0;
     else if (gap < LONGEST_GAP_MS) this.#slowMs += gap;
     if (this.#isPressed || this.#slowMs < MAX_SLOW_MS) return;
@@ -109,7 +109,7 @@ export class DetailController {
 
   #isWorthIt({ gaussians: { count } }: LoadedGaussians): boolean {
     if (typeof this.#choice === 'number') return this.#choice > 0;
-    return this.#isPressed && count >= LEAST_SPLATS && count <= MOST_SPLATS;
+    return this.#isPressed && count >= MIN_SPLATS && count <= MAX_SPLATS;
   }
 
   #build(scene: LoadedGaussians): void {

@@ -223,12 +223,12 @@ export class DynamicQualityController {
   };
 
   /** Records the duration of a planned frame. */
-  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, atLeast, atMost }: WorkTime): void {
+  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, lowerBound, upperBound }: WorkTime): void {
     if (!this.#options.isOn() || size !== this.#size) return;
     const { targetMs } = this;
     // If only the bounds are known, they suffice: at most in time, or at least too slow.
-    if (atMost > targetMs && atLeast <= targetMs && atLeast < atMost) return;
-    const milliseconds = atMost > targetMs ? atLeast : atMost;
+    if (upperBound > targetMs && lowerBound <= targetMs && lowerBound < upperBound) return;
+    const milliseconds = upperBound > targetMs ? lowerBound : upperBound;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
     this.#state = nextQuality(this.#state, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });

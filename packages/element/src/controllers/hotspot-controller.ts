@@ -212,7 +212,7 @@ export class HotspotController implements ReactiveController {
     if (boxes === undefined) return;
     // All reads precede all writes, because each read after a write would cause another layout.
     const { clientWidth: width, clientHeight: height } = this.#host;
-    const leastMove = VISIBLE_MOVE / windowOf(this.#host).devicePixelRatio || 0;
+    const minMove = VISIBLE_MOVE / windowOf(this.#host).devicePixelRatio || 0;
     const view = this.#camera && new LabelView(this.#camera, this.#of.camera.viewerFrame, width, height);
     let i = 0;
     for (const hotspot of this.#hotspots.values()) {
@@ -223,7 +223,7 @@ export class HotspotController implements ReactiveController {
       const { x, y, depth, facesCamera, isOccluded, hasPanel } = hotspot;
       const isOpen = depth > 0 && facesCamera && !isOccluded;
       const box = this.#boxOf(element);
-      if (depth > 0) box.moveTo(hotspot, leastMove);
+      if (depth > 0) box.moveTo(hotspot, minMove);
       else box.remove();
       // Part of a label whose point has left the frame may still be readable.
       box.show(isOpen, hasPanel);

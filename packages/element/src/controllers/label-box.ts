@@ -79,9 +79,9 @@ export class LabelBox {
   }
 
   /** @param least Minimum visible distance, CSS pixels. */
-  moveTo({ x, y }: Located, least: number): void {
+  moveTo({ x, y }: Located, min: number): void {
     this.#isPlaced = true;
-    if (Math.abs(x - this.#x) < least && Math.abs(y - this.#y) < least) return;
+    if (Math.abs(x - this.#x) < min && Math.abs(y - this.#y) < min) return;
     this.#x = x;
     this.#y = y;
     this.#element.style.transform = `translate(${x.toFixed(2)}px, ${y.toFixed(2)}px) translate(-50%, -50%)`;

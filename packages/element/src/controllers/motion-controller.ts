@@ -3,7 +3,7 @@ import { css, type ReactiveController, type ReactiveControllerHost, type Templat
 import type { Attributes } from '../attributes.js';
 import { CORNER_STYLES, cornerButton } from '../corner-button.js';
 import { adoptStyles } from '../styles.js';
-import type { SpokenStrings } from '../words.js';
+import type { A11yStrings } from '../words.js';
 import { prefersReducedMotion } from './motion.js';
 import type { PlaybackController } from './playback-controller.js';
 
@@ -30,7 +30,7 @@ export interface MotionHost {
   readonly isOnShow: boolean;
   /** Player of `autoplay`; undefined for none. */
   readonly player: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'> | undefined;
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   /** Starts the rotation at once. */
   startTurning(): void;
 }

@@ -4,7 +4,7 @@ import type { Attributes } from '../attributes.js';
 export interface RevealHost {
   readonly attributes: Pick<Attributes, 'reveal'>;
   /** Whether there is a frame to reveal. */
-  readonly hasPicture: boolean;
+  readonly hasImage: boolean;
   posterDismissed(): void;
 }
 
@@ -28,7 +28,7 @@ export class RevealController {
 
   /** Whether the poster covers the scene. */
   get isCovered(): boolean {
-    return !this.mayReveal || !this.#of.hasPicture;
+    return !this.mayReveal || !this.#of.hasImage;
   }
 
   dismiss(): void {

@@ -65,7 +65,7 @@ const MIN_GROWTH = 4;
 
 /** Growth of the number of submissions of a frame after each loss, and its maximum: the image does not change. */
 const SUBMISSIONS_GROWTH = 4;
-const MOST_SUBMISSIONS = 64;
+const MAX_SUBMISSIONS = 64;
 
 /**
  * Life cycle of the element's scene: load, replace (the latest request wins), recover after the loss of the device,
@@ -250,7 +250,7 @@ export class SceneController implements ReactiveController {
   /** Reloads the scene after its device was lost, with only a pair of events. */
   async #restore(request: SceneRequest, loss: GPUDeviceLostInfo): Promise<void> {
     const signal = this.#running.renew();
-    this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
+    this.#submissions = Math.min(MAX_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
     this.#drop(false);
     if (!this.#isContextLost) this.#of.contextChanged('contextlost');
     this.#isContextLost = true;
@@ -307,7 +307,7 @@ export class SceneController implements ReactiveController {
         if (signal.aborted) return;
         if (!isDeviceFailure(error, isNew)) return this.fail(error);
         if (error instanceof DeviceLostError) loss = error.info;
-        this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
+        this.#submissions = Math.min(MAX_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
         if (++failures >= MAX_FAILURES) {
           // A scene that has been shown is loaded once more, some seconds later; as a new one it then gets no other
@@ -389,12 +389,12 @@ export class SceneController implements ReactiveController {
    * Whether the current scene may be released if others need its memory: the element is gone, or another scene is to
    * replace it.
    */
-  #setReleasable(isSpare: boolean): void {
+  #setReleasable(isReleasable: boolean): void {
     if (this.#scene === null) return;
     const { releasable } = this.#scene.place.memory;
     // The state of a generator cannot be restored.
     const isUnseen = this.#isUnseen && this.#state === 'ready' && !this.#scene.live;
-    if (isSpare || this.#releaseTimer || isUnseen)
+    if (isReleasable || this.#releaseTimer || isUnseen)
       releasable.set(this.#giveBack, isUnseen ? this.#scene.gaussians.byteLength : 0);
     else releasable.delete(this.#giveBack);
   }

@@ -55,7 +55,7 @@ const PREPARE_AFTER_MS = 300;
 /** Draws the scene to the element's canvas, frame by frame and only on request. */
 export class ViewController implements FrameClient {
   readonly #host: ViewHost;
-  #ownPace: dynamicQuality.DynamicQualityController | undefined;
+  #ownDynamicQuality: dynamicQuality.DynamicQualityController | undefined;
   #backend: Backend | null = null;
   /** The current surface, and its device. */
   #surface: Surface | null = null;
@@ -70,9 +70,9 @@ export class ViewController implements FrameClient {
   }
 
   /** Quality control of frames in motion; undefined until it is loaded. */
-  get #pace(): dynamicQuality.DynamicQualityController | undefined {
+  get #dynamicQuality(): dynamicQuality.DynamicQualityController | undefined {
     const host = this.#host;
-    return (this.#ownPace ??=
+    return (this.#ownDynamicQuality ??=
       quality.value &&
       new quality.value.DynamicQualityController({
         isOn: () => this.#isAuto,
@@ -100,7 +100,7 @@ export class ViewController implements FrameClient {
       lastMs: null,
       targetMs,
     } as const;
-    return this.#pace?.report ?? atStart;
+    return this.#dynamicQuality?.report ?? atStart;
   }
 
   /** Requests a frame, if it would be visible. May be called at any rate. */
@@ -126,7 +126,7 @@ export class ViewController implements FrameClient {
       });
       this.#backend = backend;
     }
-    this.#pace?.reset();
+    this.#dynamicQuality?.reset();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };
       this.requestFrame();
@@ -140,7 +140,7 @@ export class ViewController implements FrameClient {
     // Resolves pending waits.
     this.#first?.resolve();
     this.#first = undefined;
-    this.#pace?.stop();
+    this.#dynamicQuality?.stop();
     this.#host.scheduler.cancel(this);
   }
 
@@ -235,7 +235,7 @@ export class ViewController implements FrameClient {
     const occasion = { now, pixels, hasChanged, goesOn: this.#host.camera.isMoving };
     const draw: dynamicQuality.DrawFrame = (settings, onTime) =>
       backend.render({ ...request, settings }, content, onTime);
-    if (this.#pace) this.#pace.draw(occasion, this.#host.canvas!, draw);
+    if (this.#dynamicQuality) this.#dynamicQuality.draw(occasion, this.#host.canvas!, draw);
     else draw(undefined);
     this.#prepareSoon(backend);
   }

@@ -3,7 +3,7 @@
  */
 const USUAL_MS = 1000 / 60;
 /** No display is faster. */
-const LEAST_MS = 1;
+const MIN_MS = 1;
 const MEMORY = 32;
 const ENOUGH = 8;
 /** Low enough to ignore a few late frames, high enough to ignore one early frame. */
@@ -31,7 +31,7 @@ export class DisplayInterval {
     const step = this.#last === undefined ? NaN : now - this.#last;
     this.#last = now;
     // Several elements draw at one moment.
-    if (!(step >= LEAST_MS)) return;
+    if (!(step >= MIN_MS)) return;
     this.#steps = [...this.#steps, step].slice(-MEMORY);
     if (this.#steps.length >= ENOUGH) this.#milliseconds = Math.min(USUAL_MS, quantile(this.#steps, SHARE));
   }

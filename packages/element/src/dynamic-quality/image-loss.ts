@@ -22,9 +22,9 @@ export async function lossesOf(
   scales: readonly number[],
   drawn: Promise<unknown>,
 ): Promise<Map<number, number>> {
-  const picture = await createImageBitmap(canvas);
+  const image = await createImageBitmap(canvas);
   await drawn;
-  const blocks = blocksOf(picture);
+  const blocks = blocksOf(image);
   const found = new Map<number, number>();
   for (const scale of scales) {
     const sum: LossSum = { sum: 0, values: 0 };
@@ -39,19 +39,19 @@ export async function lossesOf(
  * Blocks spread over the covered area, closer together if it is small, so that it does not lie entirely in block edges,
  * which are not compared.
  */
-function blocksOf(picture: ImageBitmap): Block[] {
-  const { x, y, width, height } = coveredOf(picture);
+function blocksOf(image: ImageBitmap): Block[] {
+  const { x, y, width, height } = coveredOf(image);
   const [columns, rows] = [width, height].map((pixels) => Math.min(BLOCKS, Math.ceil((2 * pixels) / SIDE)));
   const context = contextOf(columns * SIDE, rows * SIDE);
   const placed = Array.from({ length: columns * rows }, (_, k) => {
     const [column, row] = [k % columns, Math.floor(k / columns)];
-    const left = firstOf(x + ((column + 0.5) * width) / columns, picture.width);
-    const top = firstOf(y + ((row + 0.5) * height) / rows, picture.height);
-    context.drawImage(picture, left, top, SIDE, SIDE, column * SIDE, row * SIDE, SIDE, SIDE);
+    const left = firstOf(x + ((column + 0.5) * width) / columns, image.width);
+    const top = firstOf(y + ((row + 0.5) * height) / rows, image.height);
+    context.drawImage(image, left, top, SIDE, SIDE, column * SIDE, row * SIDE, SIDE, SIDE);
     return { x: left, y: top, column, row };
   });
-  const [across, down] = [Math.min(SIDE, picture.width), Math.min(SIDE, picture.height)];
-  picture.close();
+  const [across, down] = [Math.min(SIDE, image.width), Math.min(SIDE, image.height)];
+  image.close();
   // Each call is a round trip to the GPU.
   const { data } = context.getImageData(0, 0, columns * SIDE, rows * SIDE);
   return placed.map(({ x, y, column, row }) => ({
@@ -82,14 +82,14 @@ const firstOf = (middle: number, pixels: number): number =>
   Math.max(0, Math.min(pixels - SIDE, Math.round(middle - SIDE / 2)));
 
 /** The covered rectangle at cell precision; the entire image if nothing is covered. */
-function coveredOf(picture: ImageBitmap): Pick<DOMRect, 'x' | 'y' | 'width' | 'height'> {
+function coveredOf(image: ImageBitmap): Pick<DOMRect, 'x' | 'y' | 'width' | 'height'> {
   const context = contextOf(CELLS, CELLS);
-  context.drawImage(picture, 0, 0, CELLS, CELLS);
+  context.drawImage(image, 0, 0, CELLS, CELLS);
   const { data } = context.getImageData(0, 0, CELLS, CELLS);
   const covered = Array.from({ length: CELLS * CELLS }, (_, i) => i).filter((i) => data[4 * i + 3] > 0);
   const [columns, rows] = [covered.map((i) => i % CELLS), covered.map((i) => Math.floor(i / CELLS))];
-  const [x, width] = span(columns, picture.width);
-  const [y, height] = span(rows, picture.height);
+  const [x, width] = span(columns, image.width);
+  const [y, height] = span(rows, image.height);
   return { x, y, width, height };
 }
 

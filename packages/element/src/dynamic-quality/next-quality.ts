@@ -27,7 +27,7 @@ const ENOUGH = 5;
 /** Shorter times are indistinguishable from 0, ms. */
 const NOTHING_MS = 0.01;
 /** Frames needed for a decision if all of them are too slow. */
-const LEAST = 3;
+const MIN_FRAMES = 3;
 /** The level is chosen to take the first fraction of the target; it is kept up to the second. */
 const AIM = 0.85;
 const LATE = 1.05;
@@ -77,13 +77,13 @@ function observe(
   const usual = usualOf(recent);
   const isWaking = hasRested || now - movedAt < WAKING_MS;
   const step = isWaking ? 0 : Math.min(LONGEST_STEP_MS, now - state.sampledAt);
-  const most = (state.smoothedMs || AIM * targetMs) * GROWTH ** (step / 1000);
+  const max = (state.smoothedMs || AIM * targetMs) * GROWTH ** (step / 1000);
   let { measured } = state;
   const load = state.load || usual;
   // Until the memory is full, the load from before the change is used.
-  if (state.recent.length < MEMORY && recent.length >= LEAST)
+  if (state.recent.length < MEMORY && recent.length >= MIN_FRAMES)
     measured = { ...measured, [level]: { share: usual / load, at: now, load } };
-  const smoothedMs = recent.length < LEAST ? state.smoothedMs : Math.max(LITTLE * targetMs, Math.min(most, usual));
+  const smoothedMs = recent.length < MIN_FRAMES ? state.smoothedMs : Math.max(LITTLE * targetMs, Math.min(max, usual));
   return { ...state, recent, movedAt, sampledAt: now, load, measured, smoothedMs };
 }
 
@@ -100,7 +100,7 @@ function usualOf(recent: readonly number[]): number {
 /** The next level, or null to keep the current one. */
 function choose(state: QualityState, now: number, rules: QualityTargets): QualityState | null {
   const { level, recent, measured } = state;
-  if (recent.length < LEAST) return null;
+  if (recent.length < MIN_FRAMES) return null;
   const usual = usualOf(recent);
   const load = usual / measured[level].share;
   const model = modelOf(rules.levels, measured, { now, level, load });
@@ -111,8 +111,8 @@ function choose(state: QualityState, now: number, rules: QualityTargets): Qualit
 
 /** The most accurate level that is predicted to be fast enough, else one of the fastest. */
 function bestOf(times: readonly number[], targetMs: number): number {
-  const least = Math.min(...times);
-  const within = least <= AIM * targetMs ? AIM * targetMs : Math.max(targetMs, AS_FAST * least);
+  const min = Math.min(...times);
+  const within = min <= AIM * targetMs ? AIM * targetMs : Math.max(targetMs, AS_FAST * min);
   return times.findIndex((time) => time <= within);
 }
 
@@ -158,12 +158,12 @@ function whereInTime(
   if (recent.length < ENOUGH) return null;
   if (direction === 'down' && now - turnedAt < hold) return null;
   // Upper limit for an unmeasured level: proportional to its pixels.
-  const mostOf = (other: number): number =>
+  const maxOf = (other: number): number =>
     isKnown[other] ? times[other] : (times[level] * inPixels(levels[other], other)) / inPixels(levels[level], level);
-  const to = times.findIndex((time, other) => time <= AIM * targetMs && mostOf(other) <= targetMs);
+  const to = times.findIndex((time, other) => time <= AIM * targetMs && maxOf(other) <= targetMs);
   if (to !== -1 && to < level) return change(state, now, to, 'spare', times[to]);
   const above = level - 1;
-  const mayBe = times[above] <= targetMs && mostOf(above) <= FAR_TOO_LATE * targetMs;
+  const mayBe = times[above] <= targetMs && maxOf(above) <= FAR_TOO_LATE * targetMs;
   const isTried = now - changedAt > TRIAL_MS && !isKnown[above] && mayBe;
   return isTried ? change(state, now, above, 'trial', times[above]) : null;
 }

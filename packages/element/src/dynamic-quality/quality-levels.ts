@@ -38,7 +38,7 @@ export const QUALITY_LEVELS: readonly QualityLevel[] = [
 ];
 
 /** Minimum number of pixels of a level: below it, tiles have too many splats each, and frames take longer. */
-const LEAST_PIXELS = 8192;
+const MIN_PIXELS = 8192;
 
 /**
  * Error of a frame by the fraction of pixels across and down, dB; hair and small subjects lose nearly everything at one
@@ -50,7 +50,7 @@ export type Losses = ReadonlyMap<number, number>;
  * Levels below this PSNR are not used: over 10 % of the covered pixels would be off by more than 16/255
  * (docs/decisions/0014).
  */
-export const LEAST_DECIBELS = 27;
+export const MIN_PSNR = 27;
 
 /** The levels that are usable for an image of this number of pixels and these losses. */
 export const levelsForSize = (
@@ -59,6 +59,5 @@ export const levelsForSize = (
   losses?: Losses,
 ): readonly QualityLevel[] =>
   levels.filter(
-    ({ scale }) =>
-      scale === 1 || (scale ** 2 * pixels >= LEAST_PIXELS && (losses?.get(scale) ?? Infinity) >= LEAST_DECIBELS),
+    ({ scale }) => scale === 1 || (scale ** 2 * pixels >= MIN_PIXELS && (losses?.get(scale) ?? Infinity) >= MIN_PSNR),
   );

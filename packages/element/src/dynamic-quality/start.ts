@@ -55,7 +55,7 @@ const TIMER_MS = 2;
  * Bounds of the wait for further changes, ms: changes of a slow hand come within the second, and never faster than the
  * first.
  */
-const [LEAST_WAIT_MS, LONGEST_WAIT_MS] = [50, 150];
+const [MIN_WAIT_MS, LONGEST_WAIT_MS] = [50, 150];
 
 /**
  * Delay after the last change until the full-resolution image starts, ms: as late as still meets its deadline, because
@@ -64,5 +64,5 @@ const [LEAST_WAIT_MS, LONGEST_WAIT_MS] = [50, 150];
  * @param intervalMs refresh interval of the display: a change is drawn in the next refresh, and so is a requested frame
  */
 export function waitForRest(wholeMs: number, intervalMs: number): number {
-  return Math.max(LEAST_WAIT_MS, Math.min(LONGEST_WAIT_MS, SHOWN_BY_MS - wholeMs - 2 * intervalMs - TIMER_MS));
+  return Math.max(MIN_WAIT_MS, Math.min(LONGEST_WAIT_MS, SHOWN_BY_MS - wholeMs - 2 * intervalMs - TIMER_MS));
 }

@@ -86,7 +86,7 @@ function lineThrough(points: readonly { x: number; y: number }[], whole?: number
   const variance = points.length * mean((point) => (point.x - x) ** 2);
   const b = (covariance + STIFFNESS * slope) / (variance + STIFFNESS);
   // Fewer pixels save time at most in proportion; more pixels cost at most the prior ratio to the full image.
-  const least = Math.min(0, ((whole === undefined ? y / 2 : whole / WHOLE) - y) / Math.max(1 - x, STIFFNESS));
-  const held = Math.max(least, Math.min(b, y / x));
+  const min = Math.min(0, ((whole === undefined ? y / 2 : whole / WHOLE) - y) / Math.max(1 - x, STIFFNESS));
+  const held = Math.max(min, Math.min(b, y / x));
   return (pixels) => y + held * (pixels - x);
 }

@@ -1,7 +1,7 @@
 /** Loaded only for the attribute `controls-panel`, if a model has inputs. */
 import { css, type ReactiveElement } from 'lit';
 import { adoptStyles } from '../styles.js';
-import { readSpokenStrings, type SpokenStrings } from '../words.js';
+import { readSpokenStrings, type A11yStrings } from '../words.js';
 import type { GeneratorInput } from './inputs.js';
 import { poseOf, turnsOf } from './pose-of.js';
 import { readNumbers, valueOf, type ControlValues, type Numbers } from './values.js';
@@ -16,7 +16,7 @@ export const PANEL_WORDS = {
 } as const;
 
 /** Maximum number of sliders for one input; larger ones are left to the page. */
-const MOST_SLIDERS = 24;
+const MAX_SLIDERS = 24;
 /** Range of coefficients without a declared one: standard deviations of body shapes. */
 const SHAPE_RANGE = [-3, 3] as const;
 const SLIDER_STEPS = 200;
@@ -90,7 +90,7 @@ const panels = new WeakMap<PanelHost, ControlsPanel>();
 /** Controls for visitors, generated from the inputs of the current models. */
 export class ControlsPanel {
   readonly #element: PanelHost;
-  readonly #strings: SpokenStrings;
+  readonly #strings: A11yStrings;
   readonly #box: HTMLElement;
   /**
    * For poses with joint rotations, which visitors edit as axis-angle: the pose of the page, and the last one that was
@@ -191,14 +191,14 @@ export class ControlsPanel {
 
   #controlsOf(owner: Owner, input: GeneratorInput): HTMLElement[] {
     if (SLIDES.includes(input.role)) return this.#sliders(owner, input);
-    if (input.role === 'image') return [this.#picture(owner, input)];
+    if (input.role === 'image') return [this.#image(owner, input)];
     return input.role === 'pose' ? this.#pose(owner, input) : [];
   }
 
   #sliders(owner: Owner, input: GeneratorInput): HTMLElement[] {
     const { name, label, size, range = SHAPE_RANGE, step = (range[1] - range[0]) / SLIDER_STEPS, names } = input;
     const initial = numbersOf(input);
-    return Array.from({ length: Math.min(size, MOST_SLIDERS) }, (_, i) => {
+    return Array.from({ length: Math.min(size, MAX_SLIDERS) }, (_, i) => {
       const title = names?.[i] ?? (size > 1 ? `${label} ${i + 1}` : label);
       const now = (): readonly number[] => valuesOf(owner, name) ?? initial;
       const valueAt = (k: number): number => now()[k] ?? now()[0];
@@ -210,13 +210,13 @@ export class ControlsPanel {
     });
   }
 
-  #picture(owner: Owner, { name, label, views = 1 }: GeneratorInput): HTMLElement {
+  #image(owner: Owner, { name, label, views = 1 }: GeneratorInput): HTMLElement {
     const field = make('input', { type: 'file', accept: 'image/*', multiple: views > 1, part: 'control-input' });
     field.addEventListener('change', () => {
       const files = [...(field.files ?? [])].slice(0, views);
       if (files.length === views) set(owner, name, views > 1 ? files : files[0]);
     });
-    return labelled(label, field);
+    return labeled(label, field);
   }
 
   /** Controls to select a joint and rotate it around its three axes. */
@@ -259,7 +259,7 @@ export class ControlsPanel {
       );
     });
     choice.addEventListener('change', () => this.#follow());
-    return [labelled(this.#word('controls-joint'), choice), ...axes];
+    return [labeled(this.#word('controls-joint'), choice), ...axes];
   }
 
   #time(): HTMLElement {
@@ -314,7 +314,7 @@ function slider(
   Object.assign(field, { min: String(min), max: String(max), step: String(step) });
   // Not an output element, because a label applies to the first one in it. A range reports its own value.
   const shown = make('span', { part: 'control-value', ariaHidden: 'true' });
-  const control = labelled(title, field, shown);
+  const control = labeled(title, field, shown);
   field.addEventListener('input', () => {
     const value = field.valueAsNumber;
     shown.textContent = short(value);
@@ -330,7 +330,7 @@ function showValue(control: HTMLElement, value: number): void {
   control.querySelector('[part=control-value]')!.textContent = short(value);
 }
 
-function labelled(title: string, ...fields: HTMLElement[]): HTMLElement {
+function labeled(title: string, ...fields: HTMLElement[]): HTMLElement {
   const control = make('label', { part: 'control' });
   const [field, ...shown] = fields;
   control.append(make('span', { part: 'control-label', textContent: title }), ...shown, field);

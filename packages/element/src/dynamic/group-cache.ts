@@ -13,13 +13,13 @@ export interface GroupSource {
 /** Prefetch time of groups; the next one is always fetched. */
 const AHEAD_SECONDS = 6;
 /** Maximum total size of groups in memory; the current and the next one are always kept. */
-const MOST_BYTES = 160 << 20;
+const MAX_BYTES = 160 << 20;
 /**
  * Milliseconds before a failed part is requested again, four times as many after each further failure, and the maximum
  * number of attempts.
  */
 const RETRY_MS = 5_000;
-const MOST_TRIES = 4;
+const MAX_TRIES = 4;
 
 /** State of a part. */
 interface Entry {
@@ -34,7 +34,7 @@ export class GroupCache {
   readonly #index: ClipIndex;
   readonly #source: GroupSource;
   readonly #entries = new Map<string, Entry>();
-  readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, mostTries: MOST_TRIES });
+  readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, maxTries: MAX_TRIES });
   #wanted: readonly (readonly [group: number, part: number])[] = [];
   #wantedFor = '';
   #isClosed = false;
@@ -129,12 +129,12 @@ export class GroupCache {
     const kept = [...this.#entries].filter(([, { content }]) => content);
     let sum = kept.reduce((total, [, { content }]) => total + bytesOf(content!), 0);
     for (const [key, entry] of kept) {
-      if (sum + needed <= MOST_BYTES) return true;
+      if (sum + needed <= MAX_BYTES) return true;
       if (this.#isWanted(entry)) continue;
       sum -= bytesOf(entry.content!);
       this.#entries.delete(key);
     }
-    return sum + needed <= MOST_BYTES || this.#wanted.slice(0, 2).some(([own]) => own === group);
+    return sum + needed <= MAX_BYTES || this.#wanted.slice(0, 2).some(([own]) => own === group);
   }
 
   #bytesOf(group: number, part: number): number {

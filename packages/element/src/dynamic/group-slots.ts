@@ -55,12 +55,12 @@ export class GroupSlots {
     return slot;
   }
 
-  #upload(slot: number, group: number, cache: GroupCache, most: number): number {
+  #upload(slot: number, group: number, cache: GroupCache, max: number): number {
     let written = 0;
     this.#index.groups[group].parts.forEach((_, part) => {
       const content = cache.get(group, part);
-      if (content && written < most && !this.#gaussians.isWritten(slot, part))
-        written += this.#gaussians.write(slot, part, content, most - written);
+      if (content && written < max && !this.#gaussians.isWritten(slot, part))
+        written += this.#gaussians.write(slot, part, content, max - written);
     });
     return written;
   }

@@ -71,9 +71,9 @@ export class InputImages {
   }
 
   /** Sets the current images of the page; only new ones are loaded. */
-  update(pictures: Readonly<Record<string, ImageSources>>): void {
+  update(images: Readonly<Record<string, ImageSources>>): void {
     for (const name of this.#shapes.keys()) {
-      const source = valueOf(pictures, name);
+      const source = valueOf(images, name);
       if (source === undefined || isSame(source, this.#sources.get(name))) continue;
       this.#sources.set(name, source);
       const loading: Promise<void> = this.#load(name, source).finally(() => {
@@ -156,7 +156,7 @@ async function pixelsOf(
     return source;
   }
   if (typeof source !== 'string' && !(source instanceof Blob)) return source;
-  const blob = typeof source === 'string' ? await fetchPicture(source, options) : source;
+  const blob = typeof source === 'string' ? await fetchImage(source, options) : source;
   // Only the orientation of the file is applied; colors stay as encoded.
   return createImageBitmap(blob, { imageOrientation: 'from-image', premultiplyAlpha: 'premultiply' }).catch(
     (cause: unknown) => {
@@ -165,7 +165,7 @@ async function pixelsOf(
   );
 }
 
-async function fetchPicture(url: string, options: InputImagesOptions): Promise<Blob> {
+async function fetchImage(url: string, options: InputImagesOptions): Promise<Blob> {
   return new Blob([
     await fetchBeside(url, options, MAX_IMAGE, 'the image that the control names', 'check the address'),
   ]);

@@ -2,10 +2,10 @@
 import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
-import { startVariants } from '@gaussian-splat/renderer';
+import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { limitScenes } from '../gpu/memory-budget.js';
-import { pictures as frames, unlessWrong } from '../gpu/initial-frames.js';
+import { images as frames, unlessWrong } from '../gpu/initial-frames.js';
 import type { OpenOptions } from '../gpu/open-scene.js';
 import type { DeviceLease } from '../gpu/shared-device.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
@@ -61,7 +61,7 @@ export async function openDynamicScene(
   try {
     signal.throwIfAborted();
     limitScenes(lease.device, memoryBudget);
-    const starting = startVariants(lease.device, frames()).catch(unlessWrong);
+    const starting = pickInitialVariants(lease.device, frames()).catch(unlessWrong);
     starting.catch(() => undefined);
     live = await openDynamicModel(
       { ...options.live(), ...request, memoryBudget },
@@ -110,7 +110,7 @@ async function openDynamicModel(
   // Closed early when it is aborted.
   signal.addEventListener('abort', () => !isOpen && generator.close(), { once: true });
   let gaussians: DynamicGaussians | undefined;
-  let pictures: InputImages | undefined;
+  let images: InputImages | undefined;
   try {
     const { models, model } = generator;
     for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
@@ -125,14 +125,14 @@ async function openDynamicModel(
     const { onInput: onChange, onError } = listeners;
     const { credentials } = request;
     const whenIdle = (): Promise<void> => generator.idle;
-    pictures = new InputImages(device, models, new Set(), { credentials, signal, onChange, onError, whenIdle });
-    const live = liveModel(generator, gaussians, pictures, request);
+    images = new InputImages(device, models, new Set(), { credentials, signal, onChange, onError, whenIdle });
+    const live = liveModel(generator, gaussians, images, request);
     const declared = declaredBounds(model.contract);
-    pictures.update(request.state().pictures);
-    await pictures.settled();
+    images.update(request.state().images);
+    await images.settled();
     signal.throwIfAborted();
     offerPanel(request.element);
-    if (!pictures.areComplete) await waitForImages(live, model, pictures, { request, signal, place: await place });
+    if (!images.areComplete) await waitForImages(live, model, images, { request, signal, place: await place });
     signal.throwIfAborted();
     live.request(request.state(), request.camera(declared));
     await generator.idle;
@@ -159,7 +159,7 @@ async function openDynamicModel(
     };
   } catch (error) {
     generator.close();
-    pictures?.destroy();
+    images?.destroy();
     gaussians?.destroy();
     throw error;
   }
@@ -180,7 +180,7 @@ function memoryOf(models: readonly GeneratorModel[], gaussianBytes: number): Gen
 function liveModel(
   generator: Generator,
   gaussians: DynamicGaussians,
-  pictures: InputImages,
+  images: InputImages,
   { listeners, ownsControls }: DynamicRequest,
 ): Omit<DynamicModel, 'bounds'> {
   const { models, model } = generator;
@@ -195,16 +195,15 @@ function liveModel(
       ? (models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity)
       : NaN,
     request: (state, camera) => {
-      pictures.update(state.pictures);
+      images.update(state.images);
       reader.checkPose(state);
       // Two images and the pose of their cameras belong together, so no run may mix old and new ones. The last one to
       // arrive requests again.
-      if (!pictures.isLoading)
-        generator.request(reader.read(state, camera, pictures.tensors, ownsControls() ? [] : null));
+      if (!images.isLoading) generator.request(reader.read(state, camera, images.tensors, ownsControls() ? [] : null));
     },
     close: () => {
       generator.close();
-      pictures.destroy();
+      images.destroy();
     },
   };
 }

@@ -28,8 +28,8 @@ export interface PostRequest extends Pick<
  * A post-processor counts as fast enough below the first time, ms, and until it exceeds the second: the duration of a
  * run until the GPU has finished it.
  */
-const KEEPS_PACE_MS = 34;
-const LOSES_PACE_MS = 50;
+const IN_TIME_MS = 34;
+const TOO_LATE_MS = 50;
 /** Pause after a failure. */
 const RETRY_MS = 1_000;
 
@@ -44,7 +44,7 @@ export class PostView implements FrameFilter {
   readonly #request: PostRequest;
   readonly #post: PostProcessor;
   readonly #reader: StateReader;
-  readonly #pictures: InputImages;
+  readonly #images: InputImages;
   #surface: FilteredFrame | undefined;
   #tensor: GpuTensor | undefined;
   #depth: GpuTensor | undefined;
@@ -62,7 +62,7 @@ export class PostView implements FrameFilter {
   #failed = '';
   #retryAt = 0;
   #retry: ReturnType<typeof setTimeout> | undefined;
-  #keepsPace = false;
+  #isInTime = false;
 
   private constructor(device: GPUDevice, request: PostRequest, post: PostProcessor) {
     this.#device = device;
@@ -74,7 +74,7 @@ export class PostView implements FrameFilter {
     const given = new Set([input.name]);
     const whenIdle = (): Promise<void> => post.idle;
     const options = { credentials, signal, onChange, onError, whenIdle };
-    this.#pictures = new InputImages(device, models.slice(0, 1), given, options);
+    this.#images = new InputImages(device, models.slice(0, 1), given, options);
   }
 
   /** Fetches and checks it. Rejects with GaussianSplatError, or the signal's reason. */
@@ -89,8 +89,8 @@ export class PostView implements FrameFilter {
         signal,
         compare: compareOf(request),
         onFallback,
-        onPicture: (picture) => {
-          if (view) view.#accept(picture);
+        onImage: (image) => {
+          if (view) view.#accept(image);
         },
         onError: (error) => {
           if (view) view.#fail();
@@ -137,7 +137,7 @@ export class PostView implements FrameFilter {
     const surface = this.#surface;
     this.#surface = undefined;
     this.#post.close();
-    this.#pictures.destroy();
+    this.#images.destroy();
     this.#retire(surface);
   }
 
@@ -161,8 +161,8 @@ export class PostView implements FrameFilter {
 
   /** Key of everything that a run depends on. */
   #said(key: string): string {
-    const { controls, pictures, timeSeconds } = this.#request.state();
-    return `${key} ${JSON.stringify([controls, timeSeconds])} ${String(Object.values(pictures))}`;
+    const { controls, images, timeSeconds } = this.#request.state();
+    return `${key} ${JSON.stringify([controls, timeSeconds])} ${String(Object.values(images))}`;
   }
 
   /** False for a failed input, and for a while after a failure; then a frame is requested. */
@@ -179,7 +179,7 @@ export class PostView implements FrameFilter {
     this.#tried = this.#said(key);
     const { input } = this.#post;
     const state = this.#request.state();
-    this.#pictures.update(state.pictures);
+    this.#images.update(state.images);
     if (this.#tensor === undefined || this.#handed !== this.#drawn) {
       const { width = surface.width, height = surface.height, dtype, channels } = input;
       this.#tensor = surface.handOver({ width, height, dtype, channels });
@@ -195,7 +195,7 @@ export class PostView implements FrameFilter {
     }
     this.#pending = surface;
     try {
-      const read = this.#reader.read(state, camera, this.#pictures.tensors, this.#request.others());
+      const read = this.#reader.read(state, camera, this.#images.tensors, this.#request.others());
       this.#post.request(this.#tensor, { ...read, depth: this.#depth });
     } catch (error) {
       this.#request.onError(error);
@@ -205,10 +205,10 @@ export class PostView implements FrameFilter {
     });
   }
 
-  #accept(picture: GpuTensor): void {
+  #accept(image: GpuTensor): void {
     // The element may have been resized meanwhile.
-    if (this.#pending !== this.#surface || picture.dtype === 'int32') return;
-    const { buffer, dims, dtype } = picture;
+    if (this.#pending !== this.#surface || image.dtype === 'int32') return;
+    const { buffer, dims, dtype } = image;
     this.#surface?.accept({ buffer, dims, dtype });
     this.#filtered = this.#handed;
     this.#request.onChange();
@@ -222,7 +222,7 @@ export class PostView implements FrameFilter {
 
   #shows(key: string): boolean {
     const { milliseconds = Infinity } = this.#post;
-    this.#keepsPace = milliseconds <= (this.#keepsPace ? LOSES_PACE_MS : KEEPS_PACE_MS);
-    return this.#filtered !== '' && (this.#filtered === key || this.#keepsPace);
+    this.#isInTime = milliseconds <= (this.#isInTime ? TOO_LATE_MS : IN_TIME_MS);
+    return this.#filtered !== '' && (this.#filtered === key || this.#isInTime);
   }
 }

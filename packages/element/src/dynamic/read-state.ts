@@ -23,7 +23,7 @@ export class StateReader {
   read(
     state: DynamicState,
     camera: Camera,
-    pictures: Readonly<Record<string, GpuTensor>>,
+    images: Readonly<Record<string, GpuTensor>>,
     others: readonly string[] | null,
   ): GeneratorState {
     const { timeSeconds, pose } = state;
@@ -34,33 +34,29 @@ export class StateReader {
       const value = valueOf(state.controls, name);
       if (binding.role === 'shape') shape = value;
       if (binding.role !== 'control' && binding.role !== 'seed') continue;
-      const picture = valueOf(state.pictures, name);
-      if (picture !== undefined) this.#notify(name, 'numbers', String(picture).slice(0, 60), 'its default counts');
+      const image = valueOf(state.images, name);
+      if (image !== undefined) this.#notify(name, 'numbers', String(image).slice(0, 60), 'its default counts');
       if (value === undefined) continue;
       if (binding.role === 'seed') seed = this.#wholeNumber(name, value[0]);
       else controls[name] = this.#inRange(name, binding, value);
     }
-    if (others) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.pictures)], others);
-    return { timeSeconds, camera, pose, controls, shape, seed, pictures };
+    if (others) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.images)], others);
+    return { timeSeconds, camera, pose, controls, shape, seed, images };
   }
 
-  #inRange(
-    name: string,
-    { range: [least, most] }: ControlInput,
-    values: readonly number[],
-  ): number | readonly number[] {
-    const inside = values.map((value) => Math.min(most, Math.max(least, value)));
+  #inRange(name: string, { range: [min, max] }: ControlInput, values: readonly number[]): number | readonly number[] {
+    const inside = values.map((value) => Math.min(max, Math.max(min, value)));
     if (inside.some((value, i) => value !== values[i])) {
-      this.#notify(name, `${least} to ${most}`, values.slice(0, 4).join(' '), 'the nearest value within counts');
+      this.#notify(name, `${min} to ${max}`, values.slice(0, 4).join(' '), 'the nearest value within counts');
     }
     return inside.length === 1 ? inside[0] : inside;
   }
 
   #wholeNumber(name: string, value: number): number {
-    const [least, most] = INT32;
-    const nearest = Math.min(most, Math.max(least, Math.round(value)));
+    const [min, max] = INT32;
+    const nearest = Math.min(max, Math.max(min, Math.round(value)));
     if (nearest !== value)
-      this.#notify(name, `a whole number from ${least} to ${most}`, String(value), 'the nearest one counts');
+      this.#notify(name, `a whole number from ${min} to ${max}`, String(value), 'the nearest one counts');
     return nearest;
   }
 

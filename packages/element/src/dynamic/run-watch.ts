@@ -4,7 +4,7 @@ import { ContractError } from '@gaussian-splat/core/contract';
 /** Delay after the last run, ms: a sample reads positions back, so there is none during consecutive runs. */
 const REST_MS = 700;
 /** Maximum number of Gaussians for sampling. */
-const MOST = 1_000_000;
+const MAX_COUNT = 1_000_000;
 
 /** Interface of `DynamicGaussians` of the renderer. */
 export interface Watched {
@@ -41,7 +41,7 @@ export class RunWatch {
   /** Call when a run is shown. Returns at once. */
   frameMade(): void {
     clearTimeout(this.#timer);
-    if (this.#gaussians.count > MOST) return;
+    if (this.#gaussians.count > MAX_COUNT) return;
     this.#timer = setTimeout(() => void this.#look(), REST_MS);
   }
 

@@ -1,7 +1,7 @@
 /** Loaded only for sequences. */
 import { type Bounds } from '@gaussian-splat/core';
-import { BackOff, partRequest } from '@gaussian-splat/core/fetch';
-import { frameAt, framePath, movedFrame, type SceneSequence } from '@gaussian-splat/formats';
+import { BackOff, fileRequest } from '@gaussian-splat/core/fetch';
+import { frameAt, framePath, motionFrame, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { FileRequest, LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
@@ -31,7 +31,7 @@ const AT_ONCE = 3;
  * number of attempts.
  */
 const RETRY_MS = 5_000;
-const MOST_TRIES = 4;
+const MAX_TRIES = 4;
 
 /** A frame in transit, or loaded. */
 interface FetchedFrame {
@@ -52,7 +52,7 @@ export class SequencePlayer implements Timeline {
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, FetchedFrame>();
   /** Failures by the path of the file. */
-  readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, mostTries: MOST_TRIES });
+  readonly #failures = new BackOff<string>({ firstMs: RETRY_MS, factor: 4, maxTries: MAX_TRIES });
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
   #shown = 0;
@@ -184,7 +184,7 @@ export class SequencePlayer implements Timeline {
 
   /** Path of the file of a frame: the frames of one file of motion arrive, or fail, together. */
   #fileOf(frame: number): string {
-    return movedFrame(this.#sequence, frame)?.path ?? framePath(this.#sequence, frame);
+    return motionFrame(this.#sequence, frame)?.path ?? framePath(this.#sequence, frame);
   }
 
   /** An unavailable frame is reported once, and requested at increasing intervals, then no more. */
@@ -231,7 +231,7 @@ async function load(
   const { limits } = request;
   const sh = request.sh === 'auto' ? precision : request.sh;
   const asked = (path: string): FileRequest => {
-    const own = partRequest(path, request, limits?.origins);
+    const own = fileRequest(path, request, limits?.origins);
     // An address that the page has rewritten is not changed.
     const { href } = new URL(path, request.url);
     const url = frameUrl(href);
@@ -239,7 +239,7 @@ async function load(
   };
   if (sequence.motion === undefined)
     return loader.load({ ...asked(framePath(sequence, frame)), sh }, signal, onProgress);
-  const moved = movedFrame(sequence, frame);
+  const moved = motionFrame(sequence, frame);
   const motion = moved && { ...asked(moved.path), frame: moved.frame, frames: moved.frames };
   const wanted = { first: asked(framePath(sequence, 0)), motion, sh, limits };
   return loader.ask(

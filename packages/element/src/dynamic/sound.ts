@@ -28,7 +28,7 @@ const FAR = 0.12;
 /** Factor of the offset that is corrected per second. */
 const GAIN = 2;
 /** Maximum relative change of the speed: inaudible as a change of pitch, which browsers preserve. */
-const MOST_BEND = 0.1;
+const MAX_BEND = 0.1;
 /** Time without a frame after which the sound pauses, ms, because the image does not move. */
 const STILL_MS = 1_000;
 /** Range of playback rates that browsers support. */
@@ -153,7 +153,7 @@ export class Sound {
     const share = late / playbackRate;
     if (Math.abs(share) > FAR) track.currentTime = now;
     const isOff = Math.abs(share) > NEAR && Math.abs(share) <= FAR;
-    const bend = isOff ? Math.max(-MOST_BEND, Math.min(MOST_BEND, GAIN * share)) : 0;
+    const bend = isOff ? Math.max(-MAX_BEND, Math.min(MAX_BEND, GAIN * share)) : 0;
     const speed = Math.min(FASTEST, Math.max(SLOWEST, playbackRate * (1 + bend)));
     if (track.playbackRate !== speed) track.playbackRate = speed;
     if (track.paused) this.#start(track);

@@ -48,7 +48,7 @@ export type ControlValues = Readonly<Record<string, Numbers | ImageSources>>;
 /** Controls, sorted by type. */
 export interface ReadControls {
   readonly controls: Readonly<Record<string, readonly number[]>>;
-  readonly pictures: Readonly<Record<string, ImageSources>>;
+  readonly images: Readonly<Record<string, ImageSources>>;
 }
 
 /**
@@ -65,16 +65,16 @@ export function readControls(
     if (name.startsWith(CONTROL_PREFIX)) written.push([name.slice(CONTROL_PREFIX.length), value]);
   }
   const controls: Record<string, number[]> = {};
-  const pictures: Record<string, ImageSources> = {};
+  const images: Record<string, ImageSources> = {};
   for (const [name, value] of [...written, ...Object.entries(property ?? {})]) {
     const numbers = isPixels(value) ? undefined : readNumbers(value as Numbers);
     delete controls[name];
-    delete pictures[name];
+    delete images[name];
     if (numbers) controls[name] = numbers;
-    else if (isPixels(value) || (typeof value === 'string' && value !== '')) pictures[name] = value as ImageSources;
+    else if (isPixels(value) || (typeof value === 'string' && value !== '')) images[name] = value as ImageSources;
     else warn(`<gaussian-splat>: control ${name} expects numbers, found ${JSON.stringify(value)}; its default counts.`);
   }
-  return { controls, pictures };
+  return { controls, images };
 }
 
 const isPixels = (value: unknown): boolean =>

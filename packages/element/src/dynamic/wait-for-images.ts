@@ -23,13 +23,13 @@ const UNIT_BALL: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 
 export async function waitForImages(
   { inputs, settable }: Pick<Timeline, 'inputs' | 'settable'>,
   { layout }: Pick<GaussianModelFile, 'layout'>,
-  pictures: InputImages,
+  images: InputImages,
   { request, signal, place }: { request: DynamicRequest; signal: AbortSignal; place: WaitingPlace },
 ): Promise<void> {
   await new Promise<void>((resolve, reject) => {
     const look = (): void => {
-      pictures.update(request.state().pictures);
-      if (!pictures.areComplete) return;
+      images.update(request.state().images);
+      if (!images.areComplete) return;
       clearInterval(timer);
       resolve();
     };

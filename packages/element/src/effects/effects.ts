@@ -1,7 +1,7 @@
 /** Loaded if an element has a cut, a reveal effect or a shader. */
 import { GaussianSplatError, multiply, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import {
-  MOST_CUTS,
+  MAX_CUTS,
   SplatModifier,
   SplatProgram,
   type SplatChanges,
@@ -37,7 +37,7 @@ export interface EffectsHost {
     readonly isPreview: boolean;
     readonly progress: number | null;
   };
-  readonly behaviours: { add(mover: Mover): void };
+  readonly behaviors: { add(mover: Mover): void };
   requestFrame(): void;
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
   warn(sentence: string): void;
@@ -69,7 +69,7 @@ export class Effects implements Mover {
     this.#host = host;
     showers.set(host.element, this);
     defineCuts();
-    host.behaviours.add(this);
+    host.behaviors.add(this);
     host.element.addController({ hostUpdated: () => this.#update() });
     this.#update();
     // Frames before this code was loaded did not apply it.
@@ -177,7 +177,7 @@ export class Effects implements Mover {
     const { grown = 1, share = 1, cuts = [] } = changes;
     const isChanged = cuts.length > 0 || grown < 1 || share < 1 || this.#shader !== null;
     let modifier = this.#modifiers.get(member);
-    if (cuts.length > MOST_CUTS) this.#host.warn(tooManyCuts(cuts.length));
+    if (cuts.length > MAX_CUTS) this.#host.warn(tooManyCuts(cuts.length));
     if (isChanged && scene.renderer === 'webgl') return this.#host.warn(NO_WEBGL);
     if (!isChanged || scene.drawn.pages.length === 0) {
       if (modifier) this.#forget(member, modifier);
@@ -288,7 +288,7 @@ export class Effects implements Mover {
 const tooManyCuts = (found: number): string =>
   new GaussianSplatError('argument/splat-cut', {
     where: '<splat-cut>',
-    expected: `at most ${MOST_CUTS} cuts of one scene, a reveal by sweep included`,
+    expected: `at most ${MAX_CUTS} cuts of one scene, a reveal by sweep included`,
     found: `${found}, of which the last are left out`,
     remedy: 'put cuts of one scene into its <splat-scene>, and hide what is not needed',
   }).message;

@@ -1,5 +1,5 @@
 import { autotune } from '@gaussian-splat/renderer';
-import { sinceLastPicture } from './frame-scheduler.js';
+import { sinceLastImage } from './frame-scheduler.js';
 
 /** Milliseconds without a frame after which a page counts as idle. */
 const REST_MS = 1500;
@@ -15,7 +15,7 @@ export function chooseAtRest(device: GPUDevice): void {
 
 async function untilRest(): Promise<void> {
   let left: number;
-  while ((left = document.hidden ? REST_MS : REST_MS - sinceLastPicture()) > 0)
+  while ((left = document.hidden ? REST_MS : REST_MS - sinceLastImage()) > 0)
     await new Promise((resolve) => setTimeout(resolve, left));
   // Safari does not support it.
   if ('requestIdleCallback' in globalThis) await new Promise((resolve) => requestIdleCallback(resolve));

@@ -13,7 +13,7 @@ export interface Counted {
 }
 
 /** Minimum weight, alpha times transmittance, that is visible on an 8-bit display: half a step. */
-const LEAST_WEIGHT = 0.5 / 255;
+const MIN_WEIGHT = 0.5 / 255;
 /** Splats of a chunk, because whole chunks are recorded. */
 const CHUNK = 256;
 
@@ -56,7 +56,7 @@ async function countContributing({ device, view }: Counted, camera: Camera): Pro
       return viewpoint.isComplete();
     });
     const [counted] = await readBackWith(device, [{ buffer: contributions }], (weights) =>
-      new Float32Array(weights).reduce((sum, weight) => sum + (weight >= LEAST_WEIGHT ? 1 : 0), 0),
+      new Float32Array(weights).reduce((sum, weight) => sum + (weight >= MIN_WEIGHT ? 1 : 0), 0),
     );
     return counted;
   } finally {

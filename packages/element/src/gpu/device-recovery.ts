@@ -28,7 +28,7 @@ export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): Gaussia
 const FIRST_MS = 5_000;
 const LONGEST_MS = 300_000;
 /** A page that becomes visible requests at once, but not sooner than this after the last request, ms. */
-const LEAST_MS = 2_000;
+const MIN_MS = 2_000;
 
 /**
  * Requests a device at increasing intervals, and whenever the page becomes visible: browsers that deny a page the GPU
@@ -37,8 +37,8 @@ const LEAST_MS = 2_000;
  */
 export async function waitForDevice(device: SharedDevice, signal: AbortSignal): Promise<DeviceLease | undefined> {
   for (let pause = FIRST_MS; ; pause = Math.min(LONGEST_MS, 2 * pause)) {
-    await delay(LEAST_MS);
-    await untilShown(pause - LEAST_MS, signal);
+    await delay(MIN_MS);
+    await untilShown(pause - MIN_MS, signal);
     if (signal.aborted) return undefined;
     const lease = await device.acquire().catch(() => undefined);
     if (lease && !signal.aborted) return lease;

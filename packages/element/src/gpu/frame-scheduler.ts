@@ -28,7 +28,7 @@ export const targetMsOf = (
 ): number => (budgetMs < Infinity ? budgetMs : (SHARE_OF_INTERVAL * displayInterval) / clients);
 
 /** Milliseconds since the last frame in any window. */
-export const sinceLastPicture = (): number => performance.now() - lastDrawn;
+export const sinceLastImage = (): number => performance.now() - lastDrawn;
 
 /** Scheduler of each window with elements. */
 const KNOWN = new WeakMap<Window, FrameScheduler>();

@@ -3,7 +3,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { canvasFormat } from './webgpu-backend.js';
 
 /** Format of the canvas. */
-export const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
+export const images = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
 
 /** Only a failed self-test aborts loading; failed timings do not. */
 export function unlessWrong(error: unknown): void {

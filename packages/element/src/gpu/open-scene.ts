@@ -1,5 +1,5 @@
 import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
-import { startVariants } from '@gaussian-splat/renderer';
+import { pickInitialVariants } from '@gaussian-splat/renderer';
 import { sceneBytes } from '@gaussian-splat/renderer/tools';
 import type { DynamicRequest } from '../dynamic/dynamic-model.js';
 import type {
@@ -13,7 +13,7 @@ import type {
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import { LoadedGaussians } from './loaded-gaussians.js';
-import { pictures, unlessWrong } from './initial-frames.js';
+import { images, unlessWrong } from './initial-frames.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
 import type { PartUploads } from './part-uploads.js';
 import type { PreviewUploads } from './preview-uploads.js';
@@ -91,7 +91,7 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
   options.signal.addEventListener('abort', giveUp, { once: true });
   const acquiring = options.device.acquire();
   // While the bytes are in transit, variants for the first frame are selected.
-  const choosing = acquiring.then(({ device }) => startVariants(device, pictures()));
+  const choosing = acquiring.then(({ device }) => pickInitialVariants(device, images()));
   choosing.catch(ignore);
   const { onPreview } = options;
   let previews: Promise<PreviewUploads> | undefined;

@@ -1,7 +1,7 @@
 /** Opens streamed scenes: page by page (docs/lod-format.md), or streamed SOG box by box. */
-import { partRequest } from '@gaussian-splat/core/fetch';
+import { fileRequest } from '@gaussian-splat/core/fetch';
 import { loadModule } from '@gaussian-splat/core';
-import { MemoryLedger, startVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import { MemoryLedger, pickInitialVariants, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import { levelSource } from '@gaussian-splat/renderer/tools';
 import type { LoadedBoxes, ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { SceneWorker, SceneLoader } from '../loading/scene-loader.js';
@@ -10,7 +10,7 @@ import type { DynamicRequest } from '../dynamic/dynamic-model.js';
 import type { SceneBounds } from '../camera/settings.js';
 import { LoadedGaussians, type OwnedGaussians } from './loaded-gaussians.js';
 import { limitScenes } from './memory-budget.js';
-import { pictures, unlessWrong } from './initial-frames.js';
+import { images, unlessWrong } from './initial-frames.js';
 import type { DeviceLease } from './shared-device.js';
 import type { LodSettings } from './backend.js';
 import { streamCaps } from './stream-caps.js';
@@ -40,7 +40,7 @@ export interface OpenedStream {
 /** Fraction of the memory that the scenes of the page leave unused, because others may follow. */
 const SHARE_OF_REST = 0.5;
 /** Maximum number of listed failures of parts. */
-const MOST_WARNINGS = 16;
+const MAX_WARNINGS = 16;
 /** Allowed error in pixels, if the limits allow it. */
 const DETAIL = 1;
 
@@ -64,7 +64,7 @@ async function openStreamed(request: SceneRequest, device: GPUDevice, options: S
     // The parent of a missing page stays visible. The page is requested again repeatedly, but reported once.
     onError: (error) => {
       const sentence = error instanceof Error ? error.message : String(error);
-      if (warnings.includes(sentence) || warnings.length === MOST_WARNINGS) return;
+      if (warnings.includes(sentence) || warnings.length === MAX_WARNINGS) return;
       warnings.push(sentence);
       console.warn(sentence);
     },
@@ -132,7 +132,7 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
     ...pool,
     isDecoded: true,
     fetchPage: async (page, aborted, coded) => {
-      const part = partRequest(page, request, limits.origins);
+      const part = fileRequest(page, request, limits.origins);
       return allowance.note(part.url, loader.fetchFile({ ...part, limits: allowance.of(part.url), coded }, aborted));
     },
   });
@@ -166,7 +166,7 @@ export async function openStreamedScene(
 ): Promise<LoadedGaussians> {
   const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions, live } = options;
   const opened: { scene?: LoadedGaussians } = {};
-  await startVariants(lease.device, pictures()).catch(unlessWrong);
+  await pickInitialVariants(lease.device, images()).catch(unlessWrong);
   limitScenes(lease.device, memoryBudget);
   signal.throwIfAborted();
   const onChange = (): void => opened.scene?.onChange();

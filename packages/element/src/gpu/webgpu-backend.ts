@@ -96,7 +96,7 @@ export class WebGpuBackend implements Backend {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { quality, shDegree, order } = this.#rendering;
     // The larger error: of the page's setting and of dynamic quality.
-    const most = Math.max(detail, settings?.detail ?? 0);
+    const max = Math.max(detail, settings?.detail ?? 0);
     return {
       quality,
       shDegree,
@@ -104,7 +104,7 @@ export class WebGpuBackend implements Backend {
       submissions: this.#submissions,
       ...settings,
       ...this.#filter?.settings,
-      detail: most,
+      detail: max,
       splatBudget,
     };
   }

@@ -1,5 +1,5 @@
 /** Loaded by the worker for large PLYs: several workers pack their rows while the rest is in transit. */
-import { MOST_DROPPED, splatRanges, type LoadLimits } from '@gaussian-splat/formats';
+import { MAX_DROPPED_RATIO, splatRanges, type LoadLimits } from '@gaussian-splat/formats';
 import { boundsOf } from '@gaussian-splat/core';
 import { packGaussians } from '@gaussian-splat/renderer';
 import {
@@ -120,7 +120,7 @@ export class LargePly implements HelperWork {
       if (this.#isLate || !shares.areAllDealt) return undefined;
       const count = shares.splats;
       const droppedCount = this.#count - count;
-      if (count === 0 || droppedCount > MOST_DROPPED * this.#count) return undefined;
+      if (count === 0 || droppedCount > MAX_DROPPED_RATIO * this.#count) return undefined;
       this.#listeners.onReading?.(true);
       const layout = shares.layoutFor(this.#sh);
       if (layout !== shares.layout) {

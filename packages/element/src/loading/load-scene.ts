@@ -4,7 +4,7 @@ import {
   fetchScene,
   HEADER_BYTES,
   isSequence,
-  openPartAt,
+  fileOpenerFor,
   readScene,
   type FetchSceneOptions,
   type LoadLimits,
@@ -45,7 +45,7 @@ export interface LoadListeners {
    * @param most Maximum number.
    * @param onHelper Is called with a port to each of them when it is available.
    */
-  readonly askForHelp?: (most: number, onHelper: (port: MessagePort) => void) => void;
+  readonly askForHelp?: (max: number, onHelper: (port: MessagePort) => void) => void;
 }
 
 /**
@@ -100,13 +100,13 @@ export async function loadScene(
       return parseSequence(bytes, name);
     }
     // Blob and data URLs have no sibling files.
-    const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, options);
+    const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, options);
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, {
       ...{
         name,
         signal,
-        openPart,
+        openFile,
         level,
         onPreview: onPreview && (async (cloud) => (await previews.get().catch(none))?.onPreview(cloud)),
       },

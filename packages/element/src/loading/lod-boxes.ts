@@ -2,7 +2,7 @@
 import {
   fetchScene,
   LoadBudget,
-  readCoarsest,
+  readCoarsestLevel,
   readLodScene,
   sogAddress,
   SogFiles,
@@ -10,7 +10,7 @@ import {
   type LodScene,
 } from '@gaussian-splat/formats';
 import { loadModule } from '@gaussian-splat/core';
-import { layOutLevels, packLevelPage } from '@gaussian-splat/renderer/tools';
+import { layoutLevels, packLevelPage } from '@gaussian-splat/renderer/tools';
 import { fileLimits, fileName, limitsFrom, named, throttled } from './load-scene.js';
 import { ProgressSum } from './progress-sum.js';
 import type { BoxRequest, ClipAnswer, ClipRequest, LoadedBoxes, ProgressListener, SceneRequest } from './protocol.js';
@@ -57,9 +57,9 @@ export async function openBoxes(
       return fetchScene(part, options);
     };
     const lod = readLodScene(await fetch(url, signal), name, url, limits());
-    const coarsest = await readCoarsest(lod, files, fetch, name, signal, limits());
+    const coarsest = await readCoarsestLevel(lod, files, fetch, name, signal, limits());
     const boxes = lod.boxes.map(({ min, max, runs }) => ({ min, max, counts: runs.map(({ count }) => count) }));
-    return { levels: layOutLevels(coarsest, boxes, { sh }), ...placesOf(lod) };
+    return { levels: layoutLevels(coarsest, boxes, { sh }), ...placesOf(lod) };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);

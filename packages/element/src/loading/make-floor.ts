@@ -1,5 +1,5 @@
 /** Finds the walkable floor of a scene file; loaded by the worker on demand. */
-import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import { fetchScene, fileOpenerFor, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { floorOf, makeWalkMap, readVoxels, voxelTreePath, type WalkMap } from '@gaussian-splat/formats/walk';
 import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
 import type { FloorRequest } from './protocol.js';
@@ -24,8 +24,8 @@ export async function makeFloor(request: FloorRequest, signal: AbortSignal): Pro
       const { grid, solid } = readVoxels({ head: bytes, tree, name, limits: limits() }, frame, metersPerUnit);
       return floorOf(grid, solid, options);
     }
-    const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, fetchOptions);
-    const cloud = await readScene(bytes, { name, signal, openPart, ...limits() });
+    const openFile = /^(blob|data):/.test(url) ? undefined : fileOpenerFor(url, fetchOptions);
+    const cloud = await readScene(bytes, { name, signal, openFile, ...limits() });
     return makeWalkMap(cloud, options);
   } catch (error) {
     signal.throwIfAborted();

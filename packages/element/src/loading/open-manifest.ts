@@ -42,10 +42,10 @@ export async function openManifest(
   }
 }
 
-const tooMany = (where: string, splats: number, most: number): GaussianSplatError =>
+const tooMany = (where: string, splats: number, max: number): GaussianSplatError =>
   new GaussianSplatError('out-of-memory/budget', {
     where,
-    expected: `at most ${most} splats`,
+    expected: `at most ${max} splats`,
     found: String(splats),
     remedy: 'use a smaller scene, or allow for more',
   });

@@ -1,6 +1,6 @@
 /** Loaded by the worker for the first mesh. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { partRequest } from '@gaussian-splat/core/fetch';
+import { fileRequest } from '@gaussian-splat/core/fetch';
 import {
   fetchScene,
   Ktx2Decoder,
@@ -35,7 +35,7 @@ export async function openMeshFile(
     const bytes = await fetch({ url, credentials });
     const budget = new LoadBudget(bytes.length, limits());
     const openUri = async (uri: string): Promise<Uint8Array> => {
-      const part = await fetch(partRequest(uri, { url, credentials }, request.limits?.origins));
+      const part = await fetch(fileRequest(uri, { url, credentials }, request.limits?.origins));
       budget.arrive(part.length);
       return part;
     };

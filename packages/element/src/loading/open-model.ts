@@ -8,7 +8,7 @@ import type { ModelRequest } from './protocol.js';
  * Maximum number of nodes, tensors and values of a graph, because the main thread processes each of them. Real ones
  * have thousands.
  */
-const MOST_PARTS = 200_000;
+const MAX_PARTS = 200_000;
 
 /**
  * Reads the header of a model. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's
@@ -23,7 +23,7 @@ export async function openModel({ place, limits }: ModelRequest, signal: AbortSi
     const beside = model.header.externalFiles.reduce((sum, { byteLength }) => sum + byteLength, 0);
     if (model.size + beside > maxBytes) throw tooMuch(name, `at most ${maxBytes} bytes`, `${model.size + beside}`);
     const parts = partsOf(model.header);
-    if (parts > MOST_PARTS) throw tooMuch(name, `at most ${MOST_PARTS} nodes and tensors`, String(parts));
+    if (parts > MAX_PARTS) throw tooMuch(name, `at most ${MAX_PARTS} nodes and tensors`, String(parts));
     return model;
   } catch (error) {
     signal.throwIfAborted();

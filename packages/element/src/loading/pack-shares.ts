@@ -2,9 +2,9 @@
 import { readPrefix, samplePreview } from '@gaussian-splat/formats';
 import {
   layoutOf,
-  packShare,
+  packShard,
   sortBlock,
-  type PackedShare,
+  type PackedShard,
   type ShareBlock,
   type ShareLayout,
   type ShPrecision,
@@ -41,7 +41,7 @@ export interface HelperAnswer extends Ticket {
 /** Result of reading rows. */
 export interface ReadShare {
   /** Undefined if no row is usable, or they could not be read. */
-  readonly packed?: PackedShare | undefined;
+  readonly packed?: PackedShard | undefined;
   /** Some of the splats. */
   readonly preview?: GaussianCloud | undefined;
   readonly shDegree?: ShDegree;
@@ -69,7 +69,7 @@ export async function packRows({ bytes, name }: ShareRows, layout: ShareLayout):
   const { positions, scales, rotations, opacities, sh } = cloud;
   const share = {
     ...{ shDegree, antialiased, filterVariance, origin, up: hints?.up, order: hints?.order, warnings },
-    packed: packShare(cloud, layout),
+    packed: packShard(cloud, layout),
     preview: samplePreview(cloud),
   };
   release(positions, scales, rotations, opacities, sh);

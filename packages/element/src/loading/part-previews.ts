@@ -5,7 +5,7 @@ const FIRST_AFTER_MS = 300;
 /** Ratio of the shards in consecutive previews. */
 const GROWTH = 2;
 /** Maximum number of splats in a preview, which must be ready at once. */
-const MOST_SPLATS = 50_000;
+const MAX_SPLATS = 50_000;
 /** Maximum fraction of the time since the start of the load for previews. */
 const MAX_SHARE = 0.05;
 
@@ -45,10 +45,10 @@ export class PartPreviews {
   }
 }
 
-/** Merges several clouds, reduced to {@link MOST_SPLATS}: every n-th splat, enlarged. */
+/** Merges several clouds, reduced to {@link MAX_SPLATS}: every n-th splat, enlarged. */
 function thinned(parts: readonly GaussianCloud[]): GaussianCloud {
   const all = parts.reduce((sum, { count }) => sum + count, 0);
-  const step = Math.ceil(all / MOST_SPLATS);
+  const step = Math.ceil(all / MAX_SPLATS);
   const picked = parts.map(({ count }) => Math.ceil(count / step));
   const count = picked.reduce((sum, n) => sum + n, 0);
   const take = (name: 'positions' | 'scales' | 'rotations' | 'opacities' | 'sh', size: number): Float32Array => {

@@ -1,6 +1,6 @@
 /** The rows of a large PLY in shards that can be packed independently, and the results. */
 import type { SplatRanges } from '@gaussian-splat/formats';
-import { SHARE_SPLATS, ShareCells, type ShareCell, type ShareLayout } from '@gaussian-splat/renderer/tools';
+import { SHARD_SPLATS, ShareCells, type ShareCell, type ShareLayout } from '@gaussian-splat/renderer/tools';
 import { layoutBy, type ReadShare, type ShareRows } from './pack-shares.js';
 import type { SceneRequest } from './protocol.js';
 
@@ -28,7 +28,7 @@ export class PlyShares {
     this.#name = name;
     this.#rows = rows;
     this.#count = count;
-    this.#shares = new Array<undefined>(Math.ceil(count / SHARE_SPLATS));
+    this.#shares = new Array<undefined>(Math.ceil(count / SHARD_SPLATS));
   }
 
   get length(): number {
@@ -39,7 +39,7 @@ export class PlyShares {
   get arrived(): number {
     const { start, byteLength } = this.#rows;
     const rows = Math.floor((this.bytes.length - start) / byteLength);
-    return rows >= this.#count ? this.length : Math.max(0, Math.floor(rows / SHARE_SPLATS));
+    return rows >= this.#count ? this.length : Math.max(0, Math.floor(rows / SHARD_SPLATS));
   }
 
   get areAllDealt(): boolean {
@@ -105,8 +105,8 @@ export class PlyShares {
    */
   rowsOf(share: number, room?: ArrayBuffer): ShareRows {
     const { start, byteLength } = this.#rows;
-    const end = Math.min(this.#count, SHARE_SPLATS * (share + 1));
-    const rows = this.bytes.subarray(start + byteLength * SHARE_SPLATS * share, start + byteLength * end);
+    const end = Math.min(this.#count, SHARD_SPLATS * (share + 1));
+    const rows = this.bytes.subarray(start + byteLength * SHARD_SPLATS * share, start + byteLength * end);
     const length = start + rows.length;
     const bytes = new Uint8Array(room && room.byteLength >= length ? room : new ArrayBuffer(length), 0, length);
     bytes.set(this.bytes.subarray(0, start));

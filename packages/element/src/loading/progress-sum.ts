@@ -5,12 +5,12 @@ export class ProgressSum {
   readonly #onProgress: ProgressListener;
   readonly #files: { loaded: number; total: number | undefined }[] = [];
   /** Minimum number of files: until then the total is unknown. */
-  readonly #least: number;
+  readonly #min: number;
 
   /** @param hasParts Whether the first file names others, whose lengths count. */
   constructor(onProgress: ProgressListener, hasParts: boolean) {
     this.#onProgress = onProgress;
-    this.#least = hasParts ? 2 : 1;
+    this.#min = hasParts ? 2 : 1;
   }
 
   /** Adds another file; returns the listener of its download. */
@@ -25,7 +25,7 @@ export class ProgressSum {
 
   #report(): void {
     let loaded = 0;
-    let total: number | undefined = this.#files.length < this.#least ? undefined : 0;
+    let total: number | undefined = this.#files.length < this.#min ? undefined : 0;
     for (const file of this.#files) {
       loaded += file.loaded;
       total = total === undefined || file.total === undefined ? undefined : total + file.total;

@@ -1,7 +1,7 @@
 /** Messages between the page and the scene worker. */
 import type { ErrorData, Vector3 } from '@gaussian-splat/core';
 import type { ModelPlace } from '@gaussian-splat/core/onnx';
-import type { CpuRunMessage } from '@gaussian-splat/generator';
+import type { CpuCheckMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { FloorOptions } from '@gaussian-splat/formats/walk';
@@ -215,7 +215,7 @@ export type PageMessage =
       readonly areas?: Float32Array | undefined;
     }
   /** Runs a generator once on the CPU, in a worker that is started for it. */
-  | CpuRunMessage;
+  | CpuCheckMessage;
 
 export type WorkerMessage =
   /** The script has started. */
@@ -226,7 +226,7 @@ export type WorkerMessage =
   /** It has finished reading for a request, or the request was canceled. */
   | { readonly type: 'rested'; readonly id: number }
   /** Other workers could share the packing for a request: at most this many. */
-  | { readonly type: 'help'; readonly id: number; readonly most: number }
+  | { readonly type: 'help'; readonly id: number; readonly max: number }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'part'; readonly id: number; readonly part: ScenePart }

@@ -126,9 +126,9 @@ function serve(scope: WorkerScope): void {
         ? (part) => scope.postMessage({ type: 'part', id, part }, 'portion' in part ? buffersOf(part.portion) : [])
         : undefined,
       onReading: (isReading) => scope.postMessage({ type: isReading ? 'reading' : 'rested', id }),
-      askForHelp: (most, onHelper) => {
+      askForHelp: (max, onHelper) => {
         work.onHelper = onHelper;
-        scope.postMessage({ type: 'help', id, most });
+        scope.postMessage({ type: 'help', id, max });
       },
     });
     return [scene, 'packed' in scene && scene.packed ? buffersOf(scene.packed) : []];
@@ -210,7 +210,7 @@ function serve(scope: WorkerScope): void {
     else if (data.type === 'sort')
       serveWith(import('./sort-splats.js'), ({ sortSplats }) => sortSplats(data.port, data.positions, data.areas));
     else if (data.type === 'run-on-cpu')
-      serveWith(import('@gaussian-splat/generator'), ({ answerCpuRun }) => answerCpuRun(data));
+      serveWith(import('@gaussian-splat/generator'), ({ handleCpuRun }) => handleCpuRun(data));
     else void run(data.id, data);
   });
   scope.postMessage({ type: 'ready' });

@@ -4,8 +4,8 @@ import { SharedReads } from '@gaussian-splat/core/fetch';
 import {
   fetchScene,
   LoadBudget,
-  movedCloud,
-  openPartAt,
+  applyMotion,
+  fileOpenerFor,
   readMotion,
   readScene,
   type FetchSceneOptions,
@@ -63,7 +63,7 @@ export async function readMovedFrame(
       signal,
     );
     const budget = new LoadBudget(begun.arrived + moved.arrived, left());
-    return pack(movedCloud(begun.cloud, moved, frame, name, budget));
+    return pack(applyMotion(begun.cloud, moved, frame, name, budget));
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, name);
@@ -87,12 +87,12 @@ async function readFirst(
     ...{ ...optionsOf(request, signal), onProgress: progress.add() },
     ...fileLimits(left()),
   });
-  const openPart = openPartAt(url, options);
+  const openFile = fileOpenerFor(url, options);
   const bytes = await fetchScene(url, options());
   const cloud = await readScene(bytes, {
     ...{ name: fileName(url), signal },
-    openPart: async (path, query) => {
-      const part = await openPart(path, query);
+    openFile: async (path, query) => {
+      const part = await openFile(path, query);
       arrived += part.byteLength;
       return part;
     },

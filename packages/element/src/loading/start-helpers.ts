@@ -4,7 +4,7 @@ import type { PageMessage, WorkerMessage } from './protocol.js';
 /** Threads that are not used: the main thread, and that of the worker that is helped. */
 const OTHERS = 2;
 /** Maximum number of helpers. More would wait for the worker that distributes the shards. */
-const MOST_HELPERS = 7;
+const MAX_HELPERS = 7;
 
 /**
  * Starts workers that pack shards of a scene for another one.
@@ -12,9 +12,9 @@ const MOST_HELPERS = 7;
  * @param most Maximum number of them.
  * @returns A function that ends them.
  */
-export function startHelpers(worker: Worker, id: number, most: number, spawn: () => Worker): () => void {
+export function startHelpers(worker: Worker, id: number, max: number, spawn: () => Worker): () => void {
   const { hardwareConcurrency = 2 } = navigator;
-  const count = Math.min(most, MOST_HELPERS, Math.max(1, hardwareConcurrency - OTHERS));
+  const count = Math.min(max, MAX_HELPERS, Math.max(1, hardwareConcurrency - OTHERS));
   const helpers = Array.from({ length: count }, () => {
     const helper = spawn();
     helper.addEventListener(

@@ -3,8 +3,8 @@
  * first.
  */
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import { partRequest } from '@gaussian-splat/core/fetch';
-import { fetchScene, openPartAt, readScene, type FetchSceneOptions, type LoadLimits } from '@gaussian-splat/formats';
+import { fileRequest } from '@gaussian-splat/core/fetch';
+import { fetchScene, fileOpenerFor, readScene, type FetchSceneOptions, type LoadLimits } from '@gaussian-splat/formats';
 import type { DetailManifest } from '@gaussian-splat/renderer';
 import {
   cloudOfChunks,
@@ -43,21 +43,21 @@ export async function loadWholeStream(
   signal: AbortSignal,
   load: StreamLoad,
 ): Promise<LoadedScene> {
-  const mostSplats = Math.max(constants.CULL_GROUP, Math.floor(memory / SPLAT_BYTES));
-  if (!new URL(request.url).pathname.endsWith('detail.json')) return loadSog(request, mostSplats, signal, load);
-  return loadPages(request, mostSplats, signal, load);
+  const maxSplats = Math.max(constants.CULL_GROUP, Math.floor(memory / SPLAT_BYTES));
+  if (!new URL(request.url).pathname.endsWith('detail.json')) return loadSog(request, maxSplats, signal, load);
+  return loadPages(request, maxSplats, signal, load);
 }
 
 async function loadSog(
   { url }: SceneRequest,
-  mostSplats: number,
+  maxSplats: number,
   signal: AbortSignal,
   { name, limits, options, pack, onPreview, onReading }: StreamLoad,
 ): Promise<LoadedScene> {
   const bytes = await fetchScene(url, options());
   onReading?.(true);
   const cloud = await readScene(bytes, {
-    ...{ name, signal, mostSplats, openPart: openPartAt(url, options), ...limits() },
+    ...{ name, signal, maxSplats, openFile: fileOpenerFor(url, options), ...limits() },
     onPreview: onPreview && ((preview) => onPreview(pack(preview))),
   });
   return pack(cloud);
@@ -66,14 +66,14 @@ async function loadSog(
 /** Reads pages from the roots down until the next one does not fit. */
 async function loadPages(
   request: SceneRequest,
-  mostSplats: number,
+  maxSplats: number,
   signal: AbortSignal,
   { options, pack, onProgress, onPreview, onReading }: StreamLoad,
 ): Promise<LoadedScene> {
   const manifest = await openManifest(request, signal, onProgress);
   if (manifest.geometry === undefined) throw ofVersion1(request.url);
   const list = listPages(manifest);
-  const pages = finestPages(list, Math.floor(mostSplats / constants.CULL_GROUP));
+  const pages = finestPages(list, Math.floor(maxSplats / constants.CULL_GROUP));
   const words = new Map<string, Uint32Array<ArrayBuffer>>();
   let fetched = 0;
   let due = 1;
@@ -82,7 +82,7 @@ async function loadPages(
     const { file } = list.place(page);
     if (!words.has(file.file)) {
       const { maxBytes = Infinity, ...rest } = options();
-      const part = partRequest(file.file, request, request.limits?.origins);
+      const part = fileRequest(file.file, request, request.limits?.origins);
       const bytes = await fetchScene(part.url, {
         ...rest,
         credentials: part.credentials,

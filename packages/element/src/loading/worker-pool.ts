@@ -20,9 +20,9 @@ const RESTART_MS = 15_000;
 /** Additional time for the worker when everything for running without it is loaded, ms. */
 const GRACE_MS = 500;
 /** Maximum number of workers of a page. Untrusted scenes that never finish occupy one each; later loads wait. */
-const MOST_WORKERS = 8;
+const MAX_WORKERS = 8;
 /** Maximum number of restarts of a load, which may have been in a worker with several that never finish. */
-const MOST_MOVES = 3;
+const MAX_MOVES = 3;
 /** Restart count of a load after a worker died while reading it: one more attempt. */
 const AFTER_DEATH = 2;
 
@@ -107,7 +107,7 @@ export class WorkerPool {
     const late = slots.find(({ isLate }) => isLate);
     if (late) return void this.#doWithout(late, job);
     const free = slots.find((slot) => slot.missed < BUSY && slot.mayTake(job));
-    const slot = free ?? (slots.length < MOST_WORKERS ? this.#start() : undefined);
+    const slot = free ?? (slots.length < MAX_WORKERS ? this.#start() : undefined);
     // The creation of a worker has failed and reported it.
     if (this.#isRefused) return job.resolve(job.here());
     if (!slot) return void this.#queue.push(job);
@@ -177,13 +177,13 @@ export class WorkerPool {
     else if (message.type === 'part') job?.onPart?.(message.part);
     else if (message.type === 'answer') job?.resolve(message.answer);
     else if (message.type === 'error') job?.reject(GaussianSplatError.fromData(message.error));
-    else if (job) this.#help(slot, job.id, message.most).catch(() => undefined);
+    else if (job) this.#help(slot, job.id, message.max).catch(() => undefined);
   }
 
   /** Starts helpers for a worker that packs a large scene: they end with that load. Without their code it packs alone. */
-  async #help(slot: WorkerSlot, id: number, most: number): Promise<void> {
+  async #help(slot: WorkerSlot, id: number, max: number): Promise<void> {
     const { startHelpers } = await help.get();
-    if (slot.jobs.has(id)) slot.helpers.set(id, startHelpers(slot.worker, id, most, this.#spawn));
+    if (slot.jobs.has(id)) slot.helpers.set(id, startHelpers(slot.worker, id, max, this.#spawn));
   }
 
   /** The page may not allow workers. */
@@ -261,7 +261,7 @@ export class WorkerPool {
     slot.drop(job);
     job.moves += moves;
     // Transferred buffers cannot be sent again.
-    if (job.transfer || job.moves > MOST_MOVES) return job.reject(stopped(found));
+    if (job.transfer || job.moves > MAX_MOVES) return job.reject(stopped(found));
     this.#place(job);
   }
 
@@ -274,7 +274,7 @@ export class WorkerPool {
     const stuckWorker = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);
     this.#end(slot);
     for (const job of jobs)
-      this.#move(slot, job, job === stuckWorker ? MOST_MOVES + 1 : 1, message || 'a worker that stopped');
+      this.#move(slot, job, job === stuckWorker ? MAX_MOVES + 1 : 1, message || 'a worker that stopped');
     this.#placeQueued();
   }
 

@@ -23,7 +23,7 @@ export interface ShadowHost {
   readonly services: { readonly sceneLoader: SceneLoader };
   readonly frame: ViewerFrame;
   readonly camera: { view(width: number, height: number): Camera };
-  readonly behaviours: { add(mover: Mover): void };
+  readonly behaviors: { add(mover: Mover): void };
   readonly isImmersed: boolean;
   readonly view: { readonly backend: Backend | null };
   readonly sources: {
@@ -39,7 +39,7 @@ export interface ShadowHost {
 }
 
 /** A moving scene's shadow is updated at most this often, ms, and takes at most a tenth of the time. */
-const [LEAST_MS, SHARE] = [500, 10];
+const [MIN_MS, SHARE] = [500, 10];
 /** Camera height above the ground, in radii, below which the shadow fades out: it is invisible from below. */
 const FADE = 0.08;
 
@@ -93,7 +93,7 @@ export class ShadowController implements ReactiveController, Mover {
   constructor(core: ShadowHost) {
     this.#core = core;
     core.element.addController(this);
-    core.behaviours.add(this);
+    core.behaviors.add(this);
   }
 
   hostUpdated(): void {
@@ -161,7 +161,7 @@ export class ShadowController implements ReactiveController, Mover {
       })
       .finally(() => {
         this.#isBusy = false;
-        this.#notBefore = performance.now() + Math.max(LEAST_MS, SHARE * (performance.now() - begin));
+        this.#notBefore = performance.now() + Math.max(MIN_MS, SHARE * (performance.now() - begin));
         this.#core.requestFrame();
       });
   }

@@ -26,7 +26,7 @@ const DARKEST = 0.8;
 /** Fraction of the subject's silhouette that may lie below the ground. */
 const BELOW = 0.005;
 /** Minimum opacity of a visible splat, 0..255. */
-const LEAST_CODE = 1;
+const MIN_CODE = 1;
 
 /** The caster of the shadow: a sphere in viewer space, and the height of its ground. */
 export interface Subject {
@@ -134,7 +134,7 @@ export function shadowSplats({ layers }: ShadowMap, intensity: number, softness:
       // Optical depths are additive; opacities are not.
       const own = 1 - Math.exp(Math.log(1 - opacity) / overlap);
       const code = Math.round(255 * own);
-      if (code < LEAST_CODE) continue;
+      if (code < MIN_CODE) continue;
       const place: Vector3 = [(column + 0.5) * step - 1, 0, (row + 0.5) * step - 1];
       rows.push([place, [sigma, 1e-4 * sigma, sigma], [0, 0, 0, code]]);
     }

@@ -20,7 +20,7 @@ export interface SkyHost {
   readonly attributes: Pick<Attributes, 'skyboxImage' | 'crossorigin'>;
   readonly frame: ViewerFrame;
   readonly view: { readonly backend: Backend | null };
-  readonly behaviours: { add(mover: Mover): void };
+  readonly behaviors: { add(mover: Mover): void };
   requestFrame(): void;
   warn(sentence: string): void;
 }
@@ -36,7 +36,7 @@ export class Sky implements ReactiveController, Mover {
   constructor(host: SkyHost) {
     this.#host = host;
     host.element.addController(this);
-    host.behaviours.add(this);
+    host.behaviors.add(this);
     this.hostUpdated();
   }
 
@@ -107,9 +107,9 @@ export class Sky implements ReactiveController, Mover {
 async function decode(bytes: Uint8Array<ArrayBuffer>, backend: Backend | null): Promise<ImageBitmap> {
   const blob = new Blob([bytes]);
   const image = await createImageBitmap(blob);
-  const most = backend?.place.limits.maxTextureDimension2D ?? 4096;
-  if (Math.max(image.width, image.height) <= most) return image;
-  const scale = most / Math.max(image.width, image.height);
+  const max = backend?.place.limits.maxTextureDimension2D ?? 4096;
+  if (Math.max(image.width, image.height) <= max) return image;
+  const scale = max / Math.max(image.width, image.height);
   const side = (length: number): number => Math.max(1, Math.floor(scale * length));
   const size = { resizeWidth: side(image.width), resizeHeight: side(image.height) };
   image.close();

@@ -146,7 +146,7 @@ const vertical = (height: number | undefined, focal: number | undefined): number
   height! > 0 && focal! > 0 ? 2 * Math.atan(height! / (2 * focal!)) : undefined;
 
 /** Minimum distance of the pivot in front of the eye, in radii of the scene. */
-const LEAST_AHEAD = 0.1;
+const MIN_AHEAD = 0.1;
 
 /** A camera with an eye and a direction pivots around the point ahead that is nearest to the center of the scene. */
 function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined, context: ViewContext): CameraPose {
@@ -154,7 +154,7 @@ function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined
   const forward = normalize(direction);
   const toMiddle = subtract(toViewer(frame, bounds.center), eye);
   const along = toMiddle[0] * forward[0] + toMiddle[1] * forward[1] + toMiddle[2] * forward[2];
-  const radius = Math.max(LEAST_AHEAD * bounds.radius, along);
+  const radius = Math.max(MIN_AHEAD * bounds.radius, along);
   const [x, y, z] = eye.map((value, axis) => value + radius * forward[axis]);
   return {
     theta: Math.atan2(-forward[0], -forward[2]),

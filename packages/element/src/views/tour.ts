@@ -2,12 +2,12 @@ import { bytesOf, fetchPatiently } from '@gaussian-splat/core/fetch';
 import { css, html, nothing, render, type ReactiveController, type ReactiveControllerHost } from 'lit';
 import type { Attributes } from '../attributes.js';
 import { adoptStyles } from '../styles.js';
-import type { Behaviours } from '../behaviours.js';
+import type { Behaviors } from '../behaviours.js';
 import type { CameraPose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 import { prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import type { GaussianSplatEventMap } from '../events.js';
-import { languageOf, type SpokenStrings, type ViewWord } from '../words.js';
+import { languageOf, type A11yStrings, type ViewString } from '../words.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';
 import { Flight } from './flight.js';
 import { pathOfList, turntable, type CameraPath, type PathName } from './camera-path.js';
@@ -36,11 +36,11 @@ export interface PathOptions {
 
 export interface TourHost {
   readonly camera: CameraController;
-  readonly behaviours: Behaviours;
+  readonly behaviors: Behaviors;
   /** Fulfills, and never rejects, when nothing is pending. */
   readonly settled: Promise<unknown>;
   readonly surface: HTMLElement | null;
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   readonly attributes: Pick<Attributes, 'views'>;
   /** The scene is visible. */
   readonly isOnShow: boolean;
@@ -51,7 +51,7 @@ export interface TourHost {
 
 const DURATION_MS = 1_200;
 
-const WORDS: Readonly<Record<ViewWord, string>> = {
+const WORDS: Readonly<Record<ViewString, string>> = {
   views: 'Views',
   'next-view': 'Next view',
   'previous-view': 'Previous view',
@@ -105,7 +105,7 @@ export class Tour implements ReactiveController, Mover {
   constructor(element: ReactiveControllerHost & HTMLElement, of: TourHost) {
     this.#element = element;
     this.#of = of;
-    of.behaviours.add(this);
+    of.behaviors.add(this);
     element.addController(this);
     element.addEventListener('click', this.#onClick);
     this.hostUpdated();
@@ -129,7 +129,7 @@ export class Tour implements ReactiveController, Mover {
     const flight = this.#flight;
     if (flight === undefined || flight.isOver) return false;
     // Automatic rotation waits until the camera has arrived.
-    this.#of.behaviours.rest();
+    this.#of.behaviors.rest();
     flight.advance(now);
     return !flight.isOver;
   }
@@ -150,7 +150,7 @@ export class Tour implements ReactiveController, Mover {
     return this.flyTo((from + by + views.length) % views.length, options);
   }
 
-  async flyAlong({ duration, easing = 'linear', loop = false, path: name }: PathOptions = {}): Promise<boolean> {
+  async flyPath({ duration, easing = 'linear', loop = false, path: name }: PathOptions = {}): Promise<boolean> {
     const path = await this.path(name);
     if (path === null) return false;
     const length = duration ?? path.seconds * 1_000;
@@ -161,7 +161,7 @@ export class Tour implements ReactiveController, Mover {
     return this.#start(place, loop ? Infinity : length);
   }
 
-  async showAlong(share: number): Promise<void> {
+  async seekPath(share: number): Promise<void> {
     const path = await this.path();
     if (path === null) return;
     this.#flight?.cancel();
@@ -209,10 +209,10 @@ export class Tour implements ReactiveController, Mover {
 
   async #start(path: (elapsed: number) => CameraPose, duration: number, index = -1): Promise<boolean> {
     this.#flight?.cancel();
-    const { behaviours, camera } = this.#of;
+    const { behaviors, camera } = this.#of;
     const flight = (this.#flight = new Flight(camera, duration === 0 ? () => path(Infinity) : path, duration));
-    behaviours.rest();
-    const announcer = behaviours.announcer.value!;
+    behaviors.rest();
+    const announcer = behaviors.announcer.value!;
     announcer.isQuiet = true;
     this.#of.requestFrame();
     const arrived = await flight.finished;
@@ -299,7 +299,7 @@ export class Tour implements ReactiveController, Mover {
 
   #template(): unknown {
     const { strings } = this.#of;
-    const word = (key: ViewWord): string => strings[key] ?? WORDS[key];
+    const word = (key: ViewString): string => strings[key] ?? WORDS[key];
     const lang = languageOf(strings) ?? nothing;
     const hasSlot = this.#children.some(({ slot }) => slot === 'view');
     const name = this.#views[this.#current]?.name ?? `${this.#views.length}`;

@@ -10,7 +10,7 @@ import type { CameraController } from '../controllers/camera-controller.js';
 import { MAX_MOVER_STEP_MS, prefersReducedMotion, type Mover } from '../controllers/motion.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
-import type { SpokenStrings, WalkWord } from '../words.js';
+import type { A11yStrings, WalkWord } from '../words.js';
 import { openFloor } from './floor-source.js';
 import { Joystick } from './joystick.js';
 import { Walker } from './walker.js';
@@ -19,10 +19,10 @@ export interface WalkHost {
   readonly element: HTMLElement;
   readonly attributes: Pick<Attributes, 'navigation' | 'walkMap' | 'eyeHeight' | 'unit' | 'cameraControls'>;
   readonly camera: CameraController;
-  readonly behaviours: { readonly announcer: { readonly value: Pick<AnnouncerController, 'say'> | undefined } };
+  readonly behaviors: { readonly announcer: { readonly value: Pick<AnnouncerController, 'say'> | undefined } };
   readonly surface: HTMLElement | null;
   readonly frame: ViewerFrame;
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   readonly services: { readonly sceneLoader: SceneLoader };
   /** The request of the displayed scene; null without one, and for sources without a file. */
   readonly walkable: SceneRequest | null;
@@ -167,8 +167,8 @@ export class WalkController implements ReactiveController, Mover {
   /** A wall is announced to screen readers once. */
   #notifyBlocked(isWalking: boolean): void {
     const isBlocked = isWalking && this.#walker!.isBlocked;
-    if (isBlocked && !this.#isSaid) this.#of.behaviours.announcer.value?.say(this.#word('blocked'));
-    if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviours.announcer.value?.say('');
+    if (isBlocked && !this.#isSaid) this.#of.behaviors.announcer.value?.say(this.#word('blocked'));
+    if (!isBlocked && this.#isSaid && isWalking) this.#of.behaviors.announcer.value?.say('');
     this.#isSaid = isBlocked || (this.#isSaid && !isWalking);
   }
 

@@ -139,11 +139,11 @@ export class WebGlBackend implements Backend {
     if (this.#sorted === undefined) return void (this.#isOwed = true);
     if (onTime === undefined) return this.#draw(frame);
     const { resolutionScale = 1 } = frame.settings ?? {};
-    const least = SURE_SHARE * this.#wholeMs * resolutionScale ** 2;
+    const min = SURE_SHARE * this.#wholeMs * resolutionScale ** 2;
     this.scene.lease.clock
-      .time(() => this.#draw(frame), least)
+      .time(() => this.#draw(frame), min)
       .then((time) => {
-        if (resolutionScale === 1) this.#wholeMs = Math.min(this.#wholeMs || Infinity, time.atMost);
+        if (resolutionScale === 1) this.#wholeMs = Math.min(this.#wholeMs || Infinity, time.upperBound);
         onTime(time);
       })
       .catch(() => undefined);

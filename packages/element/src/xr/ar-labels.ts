@@ -4,7 +4,7 @@ import type { ViewerFrame } from '../camera/orbit.js';
 import { LabelBox, LabelView, type Located } from '../controllers/label-box.js';
 
 /** Labels move by whole device pixels and more. */
-const LEAST_MOVE = 0.5;
+const MIN_MOVE = 0.5;
 
 interface ArLabel {
   readonly box: LabelBox;
@@ -41,7 +41,7 @@ export class ArLabels {
     const view = new LabelView(camera, frame, clientWidth, clientHeight);
     for (const { box, place } of this.#labels) {
       view.locate(place);
-      if (place.depth > 0) box.moveTo(place, LEAST_MOVE / devicePixelRatio);
+      if (place.depth > 0) box.moveTo(place, MIN_MOVE / devicePixelRatio);
       else box.remove();
       box.show(place.depth > 0 && place.facesCamera, false);
     }

@@ -18,7 +18,7 @@ import type { XrGuide } from './xr-session.js';
 /** Range of an object's initial size, meters. */
 const [SMALLEST, LARGEST] = [0.5, 1];
 /** Range of scales for gestures. */
-const [LEAST_SCALE, MOST_SCALE] = [0.05, 20];
+const [MIN_SCALE, MAX_SCALE] = [0.05, 20];
 /** Scales this close to true size snap to it. */
 const SNAP = 0.05;
 /** Downward angle of the ray that searches for the floor, from the center of the view, radians. */
@@ -234,7 +234,7 @@ class ArGuide implements XrGuide {
     if (fingers.count < 2) return;
     this.#turn -= fingers.angle - before.angle;
     if (this.#isFixed || before.apart === 0) return;
-    this.#scale = Math.min(MOST_SCALE, Math.max(LEAST_SCALE, (this.#scale * fingers.apart) / before.apart));
+    this.#scale = Math.min(MAX_SCALE, Math.max(MIN_SCALE, (this.#scale * fingers.apart) / before.apart));
     if (this.#core.attributes.unit && Math.abs(this.#scale - 1) < SNAP) this.#scale = 1;
   }
 

@@ -66,7 +66,7 @@ export class Extras {
     this.measure = new Lazy(
       'the code for measuring',
       async () => {
-        const [{ Measure }] = await Promise.all([import('./measure.js'), core.behaviours.announcer.get()]);
+        const [{ Measure }] = await Promise.all([import('./measure.js'), core.behaviors.announcer.get()]);
         return new Measure(element, core, place);
       },
       update,

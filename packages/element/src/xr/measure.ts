@@ -102,7 +102,7 @@ export class Measure implements ReactiveController {
   }
 
   #say(text: string): void {
-    this.#core.behaviours.announcer.value?.say(text);
+    this.#core.behaviors.announcer.value?.say(text);
   }
 
   #toggle(): void {

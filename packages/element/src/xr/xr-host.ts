@@ -8,7 +8,7 @@ import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { Lazy } from '../lazy.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
-import type { SpokenStrings } from '../words.js';
+import type { A11yStrings } from '../words.js';
 
 /** The interface of the element that VR, AR and the ruler use. */
 export interface XrHost {
@@ -16,7 +16,7 @@ export interface XrHost {
   readonly attributes: Attributes;
   readonly camera: CameraController;
   readonly surface: HTMLElement | null;
-  readonly strings: SpokenStrings;
+  readonly strings: A11yStrings;
   readonly frame: ViewerFrame;
   readonly services: { readonly sceneLoader: SceneLoader };
   /** The request of the displayed scene; null without one, and for sources without a file. */
@@ -25,7 +25,7 @@ export interface XrHost {
     readonly ownEntry: { readonly scene: { readonly scene: LoadedGaussians | null; readonly isOutgoing: boolean } };
   };
   readonly reveal: { dismiss(): void };
-  readonly behaviours: { readonly announcer: Lazy<AnnouncerController> };
+  readonly behaviors: { readonly announcer: Lazy<AnnouncerController> };
   readonly isOnShow: boolean;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   readonly drawnFrom: Camera | undefined;

@@ -19,7 +19,7 @@ const SHARE_OF_INTERVAL = 0.8;
 const USUAL_RATE = 72;
 /** Interval between measured frames, ms: quality adapts within seconds, because a head never rests. */
 const MEASURE_MS = 1_000;
-const LEAST_SCALE = 0.5;
+const MIN_SCALE = 0.5;
 const SCALE_STEP = 0.85;
 /** Meters. */
 const [NEAR, FAR] = [0.05, 1000];
@@ -174,7 +174,7 @@ export class XrLoop {
 
   /** Adapts the number of pixels to the measured time. @param milliseconds frame time on the GPU, at most */
   adapt(milliseconds: number): void {
-    if (milliseconds > this.targetMs) this.scale = Math.max(LEAST_SCALE, this.scale * SCALE_STEP);
+    if (milliseconds > this.targetMs) this.scale = Math.max(MIN_SCALE, this.scale * SCALE_STEP);
     else if (milliseconds < this.targetMs / 2) this.scale = Math.min(1, this.scale / SCALE_STEP);
   }
 }

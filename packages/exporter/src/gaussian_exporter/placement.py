@@ -245,7 +245,7 @@ def _types(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
 
 
 def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
-    most = RULES["mostSplitOutputs"]
+    most = RULES["maxSplitOutputs"]
     if node.op_type == "Split" and len(node.output) > most:
         reason = f"a Split into {len(node.output)} binds more buffers than a shader may"
         reason += ", and the whole model runs on the CPU"

@@ -11,7 +11,7 @@ import { Cursor, OPCODE, readGrids, readHeader, readUp, readWindows, recordsOf }
 /** Grids farther out than this have an origin of their own, so that places keep their precision. */
 const FAR = 1000;
 /** States that are kept, since frames that follow one another need the same. */
-const MOST_STATES = 4;
+const MAX_STATES = 4;
 
 /** Splats of a moment or a span of time, and the numbers that identify them. */
 export interface Population {
@@ -157,7 +157,7 @@ export class FourDgs {
     const asked =
       found ?? decode({ name, budget: new LoadBudget(this.byteLength, this.#limits), shDegree: header.shDegree });
     this.#states.set(key, asked);
-    for (const [oldest] of this.#states) if (this.#states.size > MOST_STATES) this.#states.delete(oldest);
+    for (const [oldest] of this.#states) if (this.#states.size > MAX_STATES) this.#states.delete(oldest);
     return asked;
   }
 }

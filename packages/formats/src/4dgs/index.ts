@@ -3,7 +3,7 @@ import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import type { LoadLimits } from '../budget.js';
 import { type ClipGroup, type ClipIndex, type ClipPartContent } from '../clip.js';
 import { damaged } from '../faults.js';
-import { MOVING, MOVING_NAMES } from '../motion.js';
+import { ANIMATED_ATTRIBUTES, ANIMATED_ATTRIBUTE_NAMES } from '../motion.js';
 import { FourDgs, type Population } from './four-dgs.js';
 import { sampledMotion, type Moments } from './sampled-motion.js';
 import { presence, type ChangingSplats } from './splats.js';
@@ -11,11 +11,11 @@ import { presence, type ChangingSplats } from './splats.js';
 export { isFourDgs } from './wire.js';
 
 /** Frames a second, unless the file has states or windows of equal length. Then the rate is theirs, multiplied until it reaches the minimum. */
-const [USUAL_RATE, LEAST_RATE, MOST_RATE] = [30, 24, 120];
+const [USUAL_RATE, MIN_RATE, MAX_RATE] = [30, 24, 120];
 /** Frames of a group at most, and what the largest group may take on the GPU before groups become shorter. */
 const GROUP_FRAMES = [15, 8, 4, 2, 1];
-const MOST_GROUP_BYTES = 64 << 20;
-const ALL_PLANES = MOVING_NAMES.reduce((sum, name) => sum + MOVING[name], 0);
+const MAX_GROUP_BYTES = 64 << 20;
+const ALL_PLANES = ANIMATED_ATTRIBUTE_NAMES.reduce((sum, name) => sum + ANIMATED_ATTRIBUTES[name], 0);
 
 /** A `.4dgs` file that is played as a clip is. Its groups are made when they are asked for. */
 export class FourDgsClip {
@@ -138,23 +138,23 @@ function rateOf(file: FourDgs): number {
   const steps = edges.slice(1).map((edge, k) => edge - edges[k]);
   const rate = 1 / Math.min(...steps);
   const isEven = steps.length > 1 && steps.every((step) => Math.abs(step * rate - Math.round(step * rate)) < 0.01);
-  if (!isEven || !(rate > 0 && rate <= MOST_RATE)) return USUAL_RATE;
+  if (!isEven || !(rate > 0 && rate <= MAX_RATE)) return USUAL_RATE;
   const whole = Math.abs(rate - Math.round(rate)) < 1e-3 ? Math.round(rate) : rate;
-  return whole * Math.ceil(LEAST_RATE / whole);
+  return whole * Math.ceil(MIN_RATE / whole);
 }
 
 /** Groups of equal length, as long as memory allows; keyframes begin a group. */
 function groupsOf(file: FourDgs, rate: number, frameCount: number): ClipGroup[] {
   let groups: ClipGroup[] = [];
-  for (const most of GROUP_FRAMES) {
+  for (const max of GROUP_FRAMES) {
     groups = [];
     for (let first = 0; first < frameCount;) {
-      const frames = Math.min(most, endOfGroup(file, first, rate, frameCount) - first);
+      const frames = Math.min(max, endOfGroup(file, first, rate, frameCount) - first);
       groups.push({ first, frames, parts: [partOf(file, first, frames, rate)] });
       first += frames;
     }
     const largest = Math.max(...groups.map(({ parts: [{ splats, planes }] }) => splats * (56 + 2 * planes)));
-    if (largest <= MOST_GROUP_BYTES) break;
+    if (largest <= MAX_GROUP_BYTES) break;
   }
   return groups;
 }

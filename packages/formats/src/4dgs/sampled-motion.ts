@@ -1,7 +1,12 @@
 /** Splats at some moments as a base and curves, which the GPU adds up: the same form that clips of our own have. */
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import type { ClipPartContent } from '../clip.js';
-import { MOVING, MOVING_NAMES, type MovingName, type MovingPart } from '../motion.js';
+import {
+  ANIMATED_ATTRIBUTES,
+  ANIMATED_ATTRIBUTE_NAMES,
+  type AnimatedAttributeName,
+  type AnimatedAttribute,
+} from '../motion.js';
 import { product } from './tracks.js';
 
 /** The same rows at every moment. */
@@ -11,7 +16,7 @@ export interface Moments {
   readonly isThere: readonly Uint8Array[];
 }
 
-const MOST_CODE = 32_767;
+const MAX_CODE = 32_767;
 /** Fraction of the largest change below which a change is ignored. */
 const NOTHING = 1e-6;
 
@@ -27,15 +32,15 @@ export function sampledMotion({ clouds, isThere }: Moments): ClipPartContent {
   }
   const base = rowsAt(clouds, first);
   const parts = Object.fromEntries(
-    MOVING_NAMES.map((name): [MovingName, MovingPart] => {
-      const changes = Array.from({ length: MOVING[name] }, () => new Float32Array(frames * count));
+    ANIMATED_ATTRIBUTE_NAMES.map((name): [AnimatedAttributeName, AnimatedAttribute] => {
+      const changes = Array.from({ length: ANIMATED_ATTRIBUTES[name] }, () => new Float32Array(frames * count));
       for (let f = 0; f < frames; f++)
         for (let row = 0; row < count; row++)
           if (isThere[f][row]) putChange(name, base, clouds[f], row, frames, f, changes);
           else if (name === 'opacity') changes[0][frames * row + f] = -base.opacities[row];
       return [name, partOf(name, changes, base, first, end, frames)];
     }),
-  ) as Record<MovingName, MovingPart>;
+  ) as Record<AnimatedAttributeName, AnimatedAttribute>;
   return { cloud: { ...base, shDegree }, motion: { splats: count, frames, parts, lives: { first, end } } };
 }
 
@@ -61,7 +66,7 @@ function rowsAt(clouds: readonly GaussianCloud[], moments: Uint16Array): Gaussia
 
 /** Differences of an attribute of a row from its base, in the numbers of `Motion`. */
 function putChange(
-  name: MovingName,
+  name: AnimatedAttributeName,
   base: GaussianCloud,
   cloud: GaussianCloud,
   row: number,
@@ -97,17 +102,17 @@ function turnBetween(from: Float32Array, to: Float32Array, row: number): readonl
 }
 
 function partOf(
-  name: MovingName,
+  name: AnimatedAttributeName,
   changes: readonly Float32Array[],
   base: GaussianCloud,
   first: Uint16Array,
   end: Uint16Array,
   frames: number,
-): MovingPart {
-  const largest = changes.reduce((most, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), most), 0);
-  const still: MovingPart = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
+): AnimatedAttribute {
+  const largest = changes.reduce((max, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), max), 0);
+  const still: AnimatedAttribute = { rank: 0, step: 1, curves: new Float32Array(0), codes: [] };
   if (largest === 0) return still;
-  const lines = name === 'position' ? linesOf(changes, first, end, frames, leastOf(base, largest)) : undefined;
+  const lines = name === 'position' ? linesOf(changes, first, end, frames, minOf(base, largest)) : undefined;
   if (lines) {
     // Bases move back to where the line is at frame 0.
     lines.forEach((own, k) => own.forEach((slope, row) => (base.positions[3 * row + k] -= slope * first[row])));
@@ -125,8 +130,8 @@ function partOf(
 }
 
 /** Change that is not ignored: positions are rounded to 32 bits. */
-const leastOf = ({ positions }: GaussianCloud, largest: number): number =>
-  Math.max(NOTHING * largest, positions.reduce((most, value) => Math.max(most, Math.abs(value)), 0) * 2 ** -22);
+const minOf = ({ positions }: GaussianCloud, largest: number): number =>
+  Math.max(NOTHING * largest, positions.reduce((max, value) => Math.max(max, Math.abs(value)), 0) * 2 ** -22);
 
 /** Slopes of rows that all follow straight lines; undefined if one does not. */
 function linesOf(
@@ -134,7 +139,7 @@ function linesOf(
   first: Uint16Array,
   end: Uint16Array,
   frames: number,
-  least: number,
+  min: number,
 ): Float32Array[] | undefined {
   const slopes = changes.map(() => new Float32Array(first.length));
   for (let k = 0; k < changes.length; k++)
@@ -143,7 +148,7 @@ function linesOf(
       const own = changes[k].subarray(frames * row, frames * (row + 1));
       const slope = last > begin ? own[last] / (last - begin) : 0;
       for (let f = begin + 1; f < last; f++)
-        if (Math.abs(own[f] - slope * (f - begin)) > Math.max(least, 1e-5 * Math.abs(own[last]))) return undefined;
+        if (Math.abs(own[f] - slope * (f - begin)) > Math.max(min, 1e-5 * Math.abs(own[last]))) return undefined;
       slopes[k][row] = slope;
     }
   return slopes;
@@ -151,8 +156,8 @@ function linesOf(
 
 /** Rounds numbers to 16 bits: [rank] values of each row become a plane each. */
 function coded(numbers: readonly Float32Array[], rank: number): { step: number; codes: Int16Array[] } {
-  const largest = numbers.reduce((most, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), most), 0);
-  const step = largest > 0 ? largest / MOST_CODE : 1;
+  const largest = numbers.reduce((max, own) => own.reduce((m, value) => Math.max(m, Math.abs(value)), max), 0);
+  const step = largest > 0 ? largest / MAX_CODE : 1;
   const codes = numbers.flatMap((own) =>
     Array.from({ length: rank }, (_, k) =>
       Int16Array.from({ length: own.length / rank }, (__, row) => Math.round(own[rank * row + k] / step)),

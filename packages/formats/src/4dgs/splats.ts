@@ -7,7 +7,7 @@ import { ATTRIBUTE, REQUIRED, type Bins } from './streams.js';
 /** Numbers of a splat's constant term, from a color of 0 to 1. */
 const SH_C0 = 0.28209479177387814;
 /** Values of bytes of spherical harmonics: from -4 to 4. */
-const [SH_LEAST, SH_STEP] = [-4, 8 / 255];
+const [SH_MIN, SH_STEP] = [-4, 8 / 255];
 
 /** Splats of one state, each with what it does over time. */
 export interface ChangingSplats {
@@ -131,8 +131,7 @@ function harmonicsFrom(colors: Int32Array, bands: readonly Int32Array[], { heade
       const own = 2 * k + 3;
       for (let channel = 0; channel < 3; channel++)
         for (let j = 0; j < own; j++)
-          sh[3 * (width * i + (k + 1) ** 2 + j) + channel] =
-            SH_LEAST + SH_STEP * codes[3 * own * i + own * channel + j];
+          sh[3 * (width * i + (k + 1) ** 2 + j) + channel] = SH_MIN + SH_STEP * codes[3 * own * i + own * channel + j];
     });
   }
   return sh;

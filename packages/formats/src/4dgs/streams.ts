@@ -68,11 +68,11 @@ function readStreamHead(cursor: Cursor): Stream {
   return { attribute, width, mode, codec, channels, count, payload: cursor.block() };
 }
 
-function requireCounts({ attribute, count, channels }: Stream, splats: number, most: number, name: string): void {
-  if (count === splats && channels === most) return;
+function requireCounts({ attribute, count, channels }: Stream, splats: number, max: number, name: string): void {
+  if (count === splats && channels === max) return;
   throw damaged(
     `${name}, attribute ${attribute}`,
-    `${most} numbers of ${grouped(splats)} splats`,
+    `${max} numbers of ${grouped(splats)} splats`,
     `${channels} of ${grouped(count)}`,
     'decode/header',
   );

@@ -3,7 +3,7 @@ import { alignedTo4, grouped, hostIsLittleEndian } from '../bytes.js';
 import { checkedPart } from '../foreign-signatures.js';
 import type { LoadBudget } from '../budget.js';
 import { damaged } from '../faults.js';
-import type { OpenPart, SceneSource, SplatRange } from '../scene-format.js';
+import type { OpenFile, SceneSource, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
 
@@ -50,7 +50,7 @@ export class GltfDocument {
   readonly name: string;
   readonly budget: LoadBudget;
   readonly #binary: Uint8Array | undefined;
-  readonly #open: OpenPart | undefined;
+  readonly #open: OpenFile | undefined;
   readonly #openUri: OpenUri | undefined;
   readonly #buffers = new Map<number, Promise<Uint8Array>>();
   /** Each file is fetched once, even if several buffers name it. */
@@ -60,7 +60,7 @@ export class GltfDocument {
   constructor(
     { json, binary }: GltfFile,
     { name, budget }: Pick<SceneSource, 'name' | 'budget'>,
-    open: { readonly part: OpenPart } | { readonly uri: OpenUri },
+    open: { readonly part: OpenFile } | { readonly uri: OpenUri },
   ) {
     this.json = json;
     this.name = name;
@@ -105,9 +105,9 @@ export class GltfDocument {
 
   /**
    * @param range Elements to read; default all.
-   * @param mostZeros Maximum number of elements of a sparse accessor without a buffer: they are zeros.
+   * @param maxZeros Maximum number of elements of a sparse accessor without a buffer: they are zeros.
    */
-  async readAccessor(index: unknown, range?: SplatRange, mostZeros = 0): Promise<AccessorData> {
+  async readAccessor(index: unknown, range?: SplatRange, maxZeros = 0): Promise<AccessorData> {
     const accessor = this.item('accessors', index);
     const path = `accessors[${String(index)}]`;
     const component =
@@ -121,7 +121,7 @@ export class GltfDocument {
     const isSparse = sparse !== undefined;
     const values =
       accessor.bufferView === undefined
-        ? this.#zeros(path, isSparse && count <= mostZeros ? width * (own.end - own.first) : undefined)
+        ? this.#zeros(path, isSparse && count <= maxZeros ? width * (own.end - own.first) : undefined)
         : await this.#readDense(accessor, path, count, width, component, own);
     let whole = values;
     if (isSparse) {

@@ -173,7 +173,7 @@ async function readAttributes(
   if (opacity !== undefined || attributes.COLOR_0 === undefined) cloud.opacities.set(await read('OPACITY', opacity, 1));
   else setAlphas(cloud, await read('COLOR_0', attributes.COLOR_0, 4));
   toWFirst(await read('ROTATION', own('ROTATION'), 4), cloud.rotations);
-  await readColours(cloud, own, attributes, read);
+  await readColors(cloud, own, attributes, read);
   return cloud;
 }
 
@@ -183,8 +183,8 @@ function degreeOf(own: (name: string) => unknown): ShDegree {
 }
 
 /** Drafts stored opacities only in the colors. */
-function setAlphas({ opacities }: DraftCloud, colours: Float32Array): void {
-  for (let i = 0; i < opacities.length; i++) opacities[i] = colours[4 * i + 3];
+function setAlphas({ opacities }: DraftCloud, colors: Float32Array): void {
+  for (let i = 0; i < opacities.length; i++) opacities[i] = colors[4 * i + 3];
 }
 
 /** glTF stores quaternions as (x, y, z, w). */
@@ -195,7 +195,7 @@ function toWFirst(source: Float32Array, out: Float32Array): void {
   }
 }
 
-async function readColours(
+async function readColors(
   cloud: DraftCloud,
   own: (name: string) => unknown,
   attributes: Json,

@@ -68,7 +68,7 @@ export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = fa
   const count = sections.reduce((sum, section) => sum + section.count, 0);
   if (count === 0) throw noSplats(where(16));
   const range = [view.getFloat32(36, true) || -1.5, view.getFloat32(40, true) || 1.5] as const;
-  const degree = sections.reduce<ShDegree>((most, own) => (own.degree > most ? own.degree : most), 0);
+  const degree = sections.reduce<ShDegree>((max, own) => (own.degree > max ? own.degree : max), 0);
   return { level: level as KsplatHeader['level'], count, degree, coefficientRange: range, sections };
 }
 

@@ -39,7 +39,7 @@ export interface LodScene {
 }
 
 /** Maximum number of splats over all levels of an index. */
-const MOST_SPLATS = 2 ** 31;
+const MAX_SPLATS = 2 ** 31;
 /** Charge for each file: its addresses, and the parsing of them. */
 const FILE_BYTES = 512;
 /** Memory of each splat before any is loaded: bounds and state of each 256. */
@@ -61,8 +61,8 @@ export function readLodScene(bytes: Uint8Array, name: string, url: string, limit
     runs: levels.flatMap((run) => (run && run.count > 0 ? { ...addresses[run.file], ...placeOf(run) } : [])).reverse(),
   }));
   const total = boxes.reduce((sum, { runs }) => runs.reduce((own, { count }) => own + count, sum), 0);
-  if (total > MOST_SPLATS) {
-    throw damaged(`${name}, tree`, `at most ${grouped(MOST_SPLATS)} splats`, grouped(total), 'decode/header');
+  if (total > MAX_SPLATS) {
+    throw damaged(`${name}, tree`, `at most ${grouped(MAX_SPLATS)} splats`, grouped(total), 'decode/header');
   }
   budget.take(total * KEPT_BYTES, name);
   return {

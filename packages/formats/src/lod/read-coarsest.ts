@@ -11,7 +11,7 @@ import { cut, type FetchBytes, type SogFiles } from './sog-files.js';
  * to one account.
  * @throws GaussianSplatError as `SogFiles.read`
  */
-export async function readCoarsest(
+export async function readCoarsestLevel(
   { boxes, environment }: LodScene,
   files: SogFiles,
   fetch: FetchBytes,

@@ -12,8 +12,8 @@ export interface GaussianLayout {
   readonly degree: ShDegree | 4;
   readonly opacity: PlyProperty;
   /** Properties of the constant color: SH coefficients, or plain colors to convert. */
-  readonly colour: readonly PlyProperty[];
-  readonly colourIsSh: boolean;
+  readonly color: readonly PlyProperty[];
+  readonly colorIsSh: boolean;
   /** False for 2D Gaussians (2DGS): discs without a third axis. */
   readonly hasThirdScale: boolean;
   /** Mip-Splatting: sizes and opacities are those before its filter, whose width is stored for each splat. */
@@ -21,8 +21,8 @@ export interface GaussianLayout {
 }
 
 const REQUIRED = ['x', 'y', 'z', 'scale_0', 'scale_1', 'rot_0', 'rot_1', 'rot_2', 'rot_3', 'opacity'];
-const SH_COLOUR = ['f_dc_0', 'f_dc_1', 'f_dc_2'];
-const PLAIN_COLOUR = ['red', 'green', 'blue'];
+const SH_COLOR = ['f_dc_0', 'f_dc_1', 'f_dc_2'];
+const PLAIN_COLOR = ['red', 'green', 'blue'];
 
 /** Finds the splats in a header. Throws `decode/not-splats` for meshes and point clouds, `decode/header` otherwise. */
 export function findGaussians(source: SceneSource, header: PlyHeader): GaussianLayout {
@@ -31,9 +31,9 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
   const scalar = (name: string): PlyProperty | undefined =>
     vertex.properties.find((property) => property.name === name && !property.listCountType);
   const missing = REQUIRED.filter((name) => !scalar(name));
-  const colourIsSh = SH_COLOUR.every(scalar);
-  const colour = (colourIsSh ? SH_COLOUR : PLAIN_COLOUR).map(scalar).filter((property) => property !== undefined);
-  if (colour.length < 3) missing.push(...SH_COLOUR);
+  const colorIsSh = SH_COLOR.every(scalar);
+  const color = (colorIsSh ? SH_COLOR : PLAIN_COLOR).map(scalar).filter((property) => property !== undefined);
+  if (color.length < 3) missing.push(...SH_COLOR);
   if (missing.length > 0) {
     const present = vertex.properties.map((property) => property.name).join(', ') || 'none';
     throw notSplats(
@@ -48,8 +48,8 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
     vertex,
     degree: shDegreeOf(source, vertex),
     opacity: scalar('opacity')!,
-    colour,
-    colourIsSh,
+    color,
+    colorIsSh,
     hasThirdScale,
     hasFilter,
   };

@@ -51,7 +51,7 @@ export async function* chunksOf(source: SceneSource): AsyncGenerator<RadChunk> {
     const { filename, offset, bytes: length } = chunk;
     if (typeof filename === 'string') {
       const path = `${name}, ${filename}`;
-      yield chunkIn(source, await (source.openPart ?? noParts(name, 'scene.rad'))(filename), path, entries);
+      yield chunkIn(source, await (source.openFile ?? noParts(name, 'scene.rad'))(filename), path, entries);
       continue;
     }
     const first = end + count(offset, `${where}.offset`);

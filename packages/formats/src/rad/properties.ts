@@ -54,25 +54,25 @@ export function contentOf(
   where: string,
   budget: SceneSource['budget'],
 ): Uint8Array {
-  const most = expected ?? MOST_INFLATED * bytes.length;
-  budget.take(isDeflated ? most : 0, where);
-  const content = isDeflated ? inflated(bytes, most, where) : encoding.endsWith('_delta') ? bytes.slice() : bytes;
+  const max = expected ?? MAX_INFLATED * bytes.length;
+  budget.take(isDeflated ? max : 0, where);
+  const content = isDeflated ? inflated(bytes, max, where) : encoding.endsWith('_delta') ? bytes.slice() : bytes;
   if (expected !== undefined && content.length < expected)
     throw damaged(where, `${grouped(expected)} bytes`, grouped(content.length), 'decode/truncated');
   return content;
 }
 
 /** Palettes do not declare their length. Limit of their inflation ratio, because float32 numbers hardly compress. */
-const MOST_INFLATED = 16;
+const MAX_INFLATED = 16;
 
 /** Spark writes raw deflate streams; other writers interpret "gz" literally. */
-function inflated(bytes: Uint8Array, most: number, where: string): Uint8Array {
-  const out = new Uint8Array(most);
+function inflated(bytes: Uint8Array, max: number, where: string): Uint8Array {
+  const out = new Uint8Array(max);
   try {
     return startsWith(bytes, [0x1f, 0x8b]) ? gunzipSync(bytes, { out }) : inflateSync(bytes, { out });
   } catch (cause) {
     // A stream that is too long ends in a RangeError.
-    const expected = `a deflate stream of ${grouped(most)} bytes`;
+    const expected = `a deflate stream of ${grouped(max)} bytes`;
     throw damaged(where, expected, (cause as Error).message || 'damage', 'decode/corrupt', cause);
   }
 }

@@ -10,10 +10,10 @@ import type { SceneSource } from '../scene-format.js';
 const CHUNK_SPLATS = 256;
 const PACKED = ['packed_position', 'packed_rotation', 'packed_scale', 'packed_color'];
 const BOUNDS = ['min_', 'max_', 'min_scale_', 'max_scale_'].flatMap((bound) => ['x', 'y', 'z'].map((a) => bound + a));
-const COLOUR_BOUNDS = ['min_', 'max_'].flatMap((bound) => ['r', 'g', 'b'].map((channel) => bound + channel));
+const COLOR_BOUNDS = ['min_', 'max_'].flatMap((bound) => ['r', 'g', 'b'].map((channel) => bound + channel));
 
-/** Bounds of one chunk, in the order of {@link BOUNDS} and then {@link COLOUR_BOUNDS}. */
-const [MIN_POSITION, MAX_POSITION, MIN_SCALE, MAX_SCALE, MIN_COLOUR, MAX_COLOUR] = [0, 3, 6, 9, 12, 15];
+/** Bounds of one chunk, in the order of {@link BOUNDS} and then {@link COLOR_BOUNDS}. */
+const [MIN_POSITION, MAX_POSITION, MIN_SCALE, MAX_SCALE, MIN_COLOR, MAX_COLOR] = [0, 3, 6, 9, 12, 15];
 const CHUNK_FLOATS = 18;
 
 /**
@@ -66,7 +66,7 @@ function checkElements(source: SceneSource, header: PlyHeader): { sh: PlyElement
   };
   const vertex = require('vertex', PACKED, 'uint32');
   const chunk = require('chunk', BOUNDS, 'float32');
-  if (chunk.properties.length > BOUNDS.length) require('chunk', COLOUR_BOUNDS, 'float32');
+  if (chunk.properties.length > BOUNDS.length) require('chunk', COLOR_BOUNDS, 'float32');
   const chunkCount = Math.ceil(vertex.count / CHUNK_SPLATS);
   if (chunk.count !== chunkCount) {
     fail(', element "chunk"', `${grouped(chunkCount)} rows, one for each 256 splats`, grouped(chunk.count));
@@ -83,10 +83,10 @@ function checkElements(source: SceneSource, header: PlyHeader): { sh: PlyElement
 function readChunkBounds(source: SceneSource, header: PlyHeader): Float32Array {
   const data = openElement(source, header, 'chunk');
   const bounds = new Float32Array(CHUNK_FLOATS * data.element.count);
-  for (let at = MAX_COLOUR; at < bounds.length; at += CHUNK_FLOATS) bounds.fill(1, at, at + 3);
+  for (let at = MAX_COLOR; at < bounds.length; at += CHUNK_FLOATS) bounds.fill(1, at, at + 3);
   readColumns(
     data,
-    [...BOUNDS, ...COLOUR_BOUNDS].map((property, offset) => ({
+    [...BOUNDS, ...COLOR_BOUNDS].map((property, offset) => ({
       property,
       array: bounds,
       stride: CHUNK_FLOATS,
@@ -104,13 +104,13 @@ function unpackSplats(words: Uint32Array, bounds: Float32Array, cloud: DraftClou
     unpack111011(words[4 * i], bounds, chunk + MIN_POSITION, chunk + MAX_POSITION, positions, 3 * i);
     unpackRotation(words[4 * i + 1], rotations, 4 * i);
     unpack111011(words[4 * i + 2], bounds, chunk + MIN_SCALE, chunk + MAX_SCALE, scales, 3 * i);
-    const colour = words[4 * i + 3];
+    const color = words[4 * i + 3];
     for (let channel = 0; channel < 3; channel++) {
-      const t = ((colour >>> (24 - 8 * channel)) & 255) / 255;
-      const value = mix(bounds[chunk + MIN_COLOUR + channel], bounds[chunk + MAX_COLOUR + channel], t);
+      const t = ((color >>> (24 - 8 * channel)) & 255) / 255;
+      const value = mix(bounds[chunk + MIN_COLOR + channel], bounds[chunk + MAX_COLOR + channel], t);
       sh[shStride * i + channel] = (value - 0.5) / SH_C0;
     }
-    opacities[i] = (colour & 255) / 255;
+    opacities[i] = (color & 255) / 255;
   }
   expInPlace(scales);
 }

@@ -10,7 +10,7 @@ import { warn } from '../faults.js';
 import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
-import { isFar, movedCloud } from '../transform/moved-cloud.js';
+import { isFar, applyMotion } from '../transform/moved-cloud.js';
 import { isJsonWith } from '../signatures.js';
 import { noParts } from './sog.js';
 
@@ -62,7 +62,7 @@ async function readSplats(source: SceneSource): Promise<GaussianCloud> {
     if (isOpen) activate(cloud, activation);
     if (hasLinearColors(primitive)) await encodeColors(cloud);
     const inScene = multiply(TO_CLOUD, toScene);
-    clouds.push(movedCloud(cloud, isOpen && activation.isInPlyFrame ? multiply(inScene, TO_CLOUD) : inScene));
+    clouds.push(applyMotion(cloud, isOpen && activation.isInPlyFrame ? multiply(inScene, TO_CLOUD) : inScene));
   }
   const whole =
     clouds.length === 1
@@ -91,12 +91,12 @@ async function encodeColors(cloud: DraftCloud): Promise<void> {
 }
 
 /** Maximum number of extensions in a message. */
-const MOST_NAMED = 6;
+const MAX_NAMED = 6;
 
 /** Warns of content that is not drawn. Other warnings of a file with meshes are left to the code that draws these. */
 function warnDropped(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
   const unknown = hasMeshes ? [] : unknownExtensions(json);
-  const named = unknown.slice(0, MOST_NAMED).map((extension) => extension.slice(0, 80));
+  const named = unknown.slice(0, MAX_NAMED).map((extension) => extension.slice(0, 80));
   if (unknown.length > 0) warn(cloud, `Extensions of glTF that are not known are left out: ${named.join(', ')}.`);
   const { animations } = json;
   if (Array.isArray(animations) && animations.length > 0)
@@ -119,7 +119,7 @@ export async function gltfSplats(source: SceneSource): Promise<{ count: number; 
   if (!isPlain(activationOf(document.json, numbers))) return undefined;
   const found = placed.map(({ primitive, path }) => splatsIn(document, primitive, path));
   const count = found.reduce((sum, own) => sum + own.count, 0);
-  const shDegree = found.reduce<ShDegree>((most, own) => (own.shDegree > most ? own.shDegree : most), 0);
+  const shDegree = found.reduce<ShDegree>((max, own) => (own.shDegree > max ? own.shDegree : max), 0);
   return { count, shDegree };
 }
 
@@ -131,7 +131,7 @@ interface PlacedSplats {
 }
 
 /** Returns the primitives with splats of the default scene in order, and the number of others. */
-function open({ bytes, name, openPart, budget }: SceneSource): {
+function open({ bytes, name, openFile, budget }: SceneSource): {
   document: GltfDocument;
   placed: PlacedSplats[];
   others: number;
@@ -139,7 +139,7 @@ function open({ bytes, name, openPart, budget }: SceneSource): {
   const document = new GltfDocument(
     openContainer({ bytes, name, budget }),
     { name, budget },
-    { part: openPart ?? noParts(name, 'scene.glb') },
+    { part: openFile ?? noParts(name, 'scene.glb') },
   );
   const placed: PlacedSplats[] = [];
   const known = new Map<number, MeshParts>();

@@ -44,42 +44,42 @@ function unpackSection(
     ? (at) => view.getFloat32(at, true)
     : (at) => halfToNumber(view.getUint16(at, true));
   const size = isWide ? 4 : 2;
-  const centres = isWide ? undefined : centresOf(view, section);
+  const centers = isWide ? undefined : centersOf(view, section);
   const { positionStep, positionRange } = section;
   for (let k = 0; k < section.count; k++) {
     const from = section.splatsAt + k * section.bytesPerSplat;
     const to = first + k;
     for (let axis = 0; axis < 3; axis++) {
-      cloud.positions[3 * to + axis] = centres
-        ? (view.getUint16(from + 2 * axis, true) - positionRange) * positionStep + centres[3 * k + axis]
+      cloud.positions[3 * to + axis] = centers
+        ? (view.getUint16(from + 2 * axis, true) - positionRange) * positionStep + centers[3 * k + axis]
         : number(from + 4 * axis);
       cloud.scales[3 * to + axis] = number(from + size * (3 + axis));
     }
     for (let c = 0; c < 4; c++) cloud.rotations[4 * to + c] = number(from + size * (6 + c));
-    unpackColour(bytes, from + 10 * size, cloud, to);
+    unpackColor(bytes, from + 10 * size, cloud, to);
   }
   unpackHarmonics(view, header, section, cloud, first);
 }
 
-function unpackColour(bytes: Uint8Array, at: number, { sh, shDegree, opacities }: DraftCloud, to: number): void {
+function unpackColor(bytes: Uint8Array, at: number, { sh, shDegree, opacities }: DraftCloud, to: number): void {
   const stride = 3 * shCoefficientCount(shDegree);
   for (let channel = 0; channel < 3; channel++) sh[stride * to + channel] = (bytes[at + channel] / 255 - 0.5) / SH_C0;
   opacities[to] = bytes[at + 3] / 255;
 }
 
 /** Center of the bucket of each splat, [count, 3]: full buckets first, then the others with their own sizes. */
-function centresOf(view: DataView, section: KsplatSection): Float32Array {
+function centersOf(view: DataView, section: KsplatSection): Float32Array {
   const { count, bucketSize, fullBuckets, partialBuckets, bucketsAt, bucketStride, partialSizesAt } = section;
-  const centres = new Float32Array(3 * count);
+  const centers = new Float32Array(3 * count);
   let splat = 0;
   for (let bucket = 0; bucket < fullBuckets + partialBuckets && splat < count; bucket++) {
     const isFull = bucket < fullBuckets;
     const size = isFull ? bucketSize : view.getUint32(partialSizesAt + 4 * (bucket - fullBuckets), true);
     const at = bucketsAt + bucketStride * bucket;
-    const centre = [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
-    for (const end = Math.min(count, splat + size); splat < end; splat++) centres.set(centre, 3 * splat);
+    const center = [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
+    for (const end = Math.min(count, splat + size); splat < end; splat++) centers.set(center, 3 * splat);
   }
-  return centres;
+  return centers;
 }
 
 function unpackHarmonics(

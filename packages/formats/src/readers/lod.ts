@@ -4,7 +4,7 @@ import { checkedPart } from '../foreign-signatures.js';
 import { damaged } from '../faults.js';
 import { parseLodMeta, runsAtAllLevels, runsAtLevel, type LodMeta, type NodeRun } from '../lod/meta.js';
 import { levelRunsOf, mergeClouds, type NodePart } from '../merge-clouds.js';
-import { previewWanted, type OpenPart, type SceneSource } from '../scene-format.js';
+import { previewWanted, type OpenFile, type SceneSource } from '../scene-format.js';
 import { readSogPart } from '../sog/read-sog.js';
 import { noParts } from './sog.js';
 
@@ -14,14 +14,14 @@ import { noParts } from './sog.js';
  * preview.
  */
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
-  const { name, level = 0, mostSplats = Infinity } = source;
+  const { name, level = 0, maxSplats = Infinity } = source;
   const meta = parseLodMeta(source);
-  const open = source.openPart ?? noParts(name, 'scene.zip');
+  const open = source.openFile ?? noParts(name, 'scene.zip');
   const coarsest = runsAtLevel(meta, meta.levels - 1);
   const around = await readEnvironment(meta, open, source);
   const countOf = (some: readonly NodeRun[]): number => some.reduce((sum, { count }) => sum + count, 0);
   let own = Math.min(level === 'all' ? 0 : level, meta.levels - 1);
-  while (own < meta.levels - 1 && countOf(runsAtLevel(meta, own)) > mostSplats) own++;
+  while (own < meta.levels - 1 && countOf(runsAtLevel(meta, own)) > maxSplats) own++;
   const runs = level === 'all' ? runsAtAllLevels(meta) : runsAtLevel(meta, own);
   if (previewWanted(source, countOf(runs)) && countOf(coarsest) < countOf(runs) / 2) {
     const parts = [...(await readRuns(coarsest, meta, open, source)), ...around];
@@ -36,7 +36,7 @@ export async function readLod(source: SceneSource): Promise<GaussianCloud> {
 async function readRuns(
   runs: readonly NodeRun[],
   { files }: LodMeta,
-  open: OpenPart,
+  open: OpenFile,
   source: SceneSource,
 ): Promise<NodePart[]> {
   const parts: NodePart[] = [];
@@ -57,7 +57,7 @@ async function readRuns(
 /** The environment is a separate node with one level, so that it is always drawn. */
 async function readEnvironment(
   { environment, leaves }: LodMeta,
-  open: OpenPart,
+  open: OpenFile,
   source: SceneSource,
 ): Promise<NodePart[]> {
   if (environment === undefined) return [];
@@ -66,7 +66,7 @@ async function readEnvironment(
 }
 
 /** Reads one SOG of the scene; paths in its description are relative to it. */
-async function readPart(path: string, open: OpenPart, source: SceneSource): Promise<GaussianCloud> {
+async function readPart(path: string, open: OpenFile, source: SceneSource): Promise<GaussianCloud> {
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const { budget, signal } = source;
   const name = `${source.name}, ${path}`;

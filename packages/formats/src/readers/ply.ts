@@ -33,7 +33,7 @@ export async function readPly(source: SceneSource): Promise<GaussianCloud> {
   readAttributes(data, layout, cloud, filter);
   source.signal?.throwIfAborted();
   const white = layout.opacity.type.startsWith('float') ? undefined : whiteOf(layout.opacity);
-  if (cloud.count >= LEAST_TESTED && white === undefined && isWithin(cloud.opacities, 0, 1)) {
+  if (cloud.count >= MIN_TESTED && white === undefined && isWithin(cloud.opacities, 0, 1)) {
     const { noteActivated } = await importMeaning();
     noteActivated(cloud, isWithin(cloud.scales, 0, Infinity));
   }
@@ -42,7 +42,7 @@ export async function readPly(source: SceneSource): Promise<GaussianCloud> {
   if (white === undefined) sigmoidInPlace(cloud.opacities);
   else for (let i = 0; i < cloud.count; i++) cloud.opacities[i] /= white;
   if (layout.hasFilter) meaning?.fuseFilter(cloud, filter);
-  if (!layout.colourIsSh) convertPlainColours(cloud, layout.colour);
+  if (!layout.colorIsSh) convertPlainColors(cloud, layout.color);
   if (hasLinearColors(source, header)) {
     const { encodeLinearColors } = await loadModule(
       'the code that encodes linear colors',
@@ -54,7 +54,7 @@ export async function readPly(source: SceneSource): Promise<GaussianCloud> {
 }
 
 /** A few splats may have all logits in 0..1 by chance. */
-const LEAST_TESTED = 50;
+const MIN_TESTED = 50;
 
 /** Whether all values lie within bounds. For most arrays of logits or logarithms this ends at the first few. */
 function isWithin(values: Float32Array, min: number, max: number): boolean {
@@ -78,7 +78,7 @@ function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftC
     ...interleaved(['rot_0', 'rot_1', 'rot_2', 'rot_3'], cloud.rotations, 4),
     ...interleaved(['opacity'], cloud.opacities, 1),
     ...interleaved(
-      layout.colour.map(({ name }) => name),
+      layout.color.map(({ name }) => name),
       cloud.sh,
       3 * shCoefficientCount(cloud.shDegree),
     ),
@@ -109,9 +109,9 @@ function flatten(cloud: DraftCloud): void {
 const whiteOf = ({ type }: Pick<PlyProperty, 'type'>): number => (type === 'uint16' ? 65_535 : 255);
 
 /** Converts colors 0..255 (integers; 16-bit ones 0..65535) or 0..1 (floats) to the constant SH coefficient. */
-function convertPlainColours(cloud: DraftCloud, colour: readonly PlyProperty[]): void {
+function convertPlainColors(cloud: DraftCloud, color: readonly PlyProperty[]): void {
   const stride = 3 * shCoefficientCount(cloud.shDegree);
-  colour.forEach(({ type }, channel) => {
+  color.forEach(({ type }, channel) => {
     const white = type.startsWith('float') ? 1 : whiteOf({ type });
     for (let at = channel; at < cloud.sh.length; at += stride) cloud.sh[at] = (cloud.sh[at] / white - 0.5) / SH_C0;
   });

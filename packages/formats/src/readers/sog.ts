@@ -13,7 +13,7 @@ const LAST_PART = /[^/]*$/;
  */
 export async function readSog(source: SceneSource): Promise<GaussianCloud> {
   const meta = parseSogMeta(source);
-  return readSogImages(meta, source.openPart ?? noParts(source.name), source);
+  return readSogImages(meta, source.openFile ?? noParts(source.name), source);
 }
 
 /**

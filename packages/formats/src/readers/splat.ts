@@ -35,14 +35,14 @@ export function readSplat(source: SceneSource): GaussianCloud {
   const body = alignedTo4(bytes);
   const floats = new Float32Array(body.buffer, body.byteOffset, body.length / 4);
   for (let i = 0; i < count; i++) {
-    const colour = SPLAT_BYTES * i + 24;
+    const color = SPLAT_BYTES * i + 24;
     for (let k = 0; k < 3; k++) {
       cloud.positions[3 * i + k] = floats[8 * i + k];
       cloud.scales[3 * i + k] = floats[8 * i + 3 + k];
-      cloud.sh[3 * i + k] = (body[colour + k] / 255 - 0.5) / SH_C0;
+      cloud.sh[3 * i + k] = (body[color + k] / 255 - 0.5) / SH_C0;
     }
-    cloud.opacities[i] = body[colour + 3] / 255;
-    for (let k = 0; k < 4; k++) cloud.rotations[4 * i + k] = (body[colour + 4 + k] - 128) / 128;
+    cloud.opacities[i] = body[color + 3] / 255;
+    for (let k = 0; k < 4; k++) cloud.rotations[4 * i + k] = (body[color + 4 + k] - 128) / 128;
   }
   return cloud;
 }

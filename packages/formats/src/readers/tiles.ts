@@ -6,7 +6,7 @@ import { multiply, type Affine } from '../gltf/nodes.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource } from '../scene-format.js';
 import { contentsAt, type TileContent } from '../tileset.js';
-import { movedCloud } from '../transform/moved-cloud.js';
+import { applyMotion } from '../transform/moved-cloud.js';
 import { isTileset, readGltf } from './gltf.js';
 import { noParts } from './sog.js';
 
@@ -34,13 +34,13 @@ export async function readTiles(source: SceneSource): Promise<GaussianCloud> {
     const { budget, signal } = source;
     const name = `${source.name}, ${uri}`;
     const folder = folderOf(uri);
-    const openPart = (path: string, query?: string): Promise<Uint8Array> => opened(source, folder + path, query);
-    const cloud = await readGltf({ bytes, name, budget, signal, openPart }).catch((error: unknown) => {
+    const openFile = (path: string, query?: string): Promise<Uint8Array> => opened(source, folder + path, query);
+    const cloud = await readGltf({ bytes, name, budget, signal, openFile }).catch((error: unknown) => {
       if (error instanceof GaussianSplatError && error.code === 'decode/not-splats') return undefined;
       throw error;
     });
     // Both rotations are their own inverse.
-    if (cloud) clouds.push(movedCloud(cloud, multiply(TO_CLOUD, multiply(toTileset, TO_CLOUD))));
+    if (cloud) clouds.push(applyMotion(cloud, multiply(TO_CLOUD, multiply(toTileset, TO_CLOUD))));
     else others++;
   }
   if (clouds.length === 0)
@@ -102,8 +102,8 @@ async function* filesOf(source: SceneSource, level: number): AsyncGenerator<Tile
   }
 }
 
-const opened = ({ openPart, name }: SceneSource, path: string, query?: string): Promise<Uint8Array> =>
-  (openPart ?? noParts(name, 'scene.zip'))(path, query);
+const opened = ({ openFile, name }: SceneSource, path: string, query?: string): Promise<Uint8Array> =>
+  (openFile ?? noParts(name, 'scene.zip'))(path, query);
 
 const folderOf = (uri: string): string => uri.replace(/\?.*$/, '').replace(/[^/]*$/, '');
 

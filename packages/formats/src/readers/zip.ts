@@ -39,12 +39,12 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const inner = archive.open(path);
   const format = findFormat(inner, path, '');
   if (!format) throw noScene(name, path, 'a file that is none');
-  if (format.name === 'zip' && source.openPart === WITHIN)
+  if (format.name === 'zip' && source.openFile === WITHIN)
     throw noScene(name, path, 'an archive within an archive within an archive');
   const read = await loadReader(format);
-  const openPart =
+  const openFile =
     format.name === 'zip' ? WITHIN : async (part: string): Promise<Uint8Array> => archive.open(folder + part);
-  return read({ ...source, bytes: inner, name: `${name}, ${path}`, openPart });
+  return read({ ...source, bytes: inner, name: `${name}, ${path}`, openFile });
 }
 
 /** Marks a nested archive. */
@@ -53,10 +53,10 @@ const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 /** Undefined if there is none. */
 async function mainFile(archive: Archive, name: string): Promise<string | undefined> {
   const paths = relevant(archive.paths);
-  for (const [description, most] of DESCRIPTIONS) {
+  for (const [description, max] of DESCRIPTIONS) {
     // Other programs have a meta.json, too.
     const named = namedLike(description, paths)
-      .filter((path) => archive.lengthOf(path) <= most)
+      .filter((path) => archive.lengthOf(path) <= max)
       .slice(0, MAX_DESCRIPTIONS);
     const found = shallowest(named.filter((path) => findFormat(archive.open(path), '', '') !== undefined));
     if (found.length > 1) throw severalScenes(name, found);

@@ -2,23 +2,23 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { checkedPart } from '../foreign-signatures.js';
 import { damaged } from '../faults.js';
-import type { OpenPart, SceneSource } from '../scene-format.js';
+import type { OpenFile, SceneSource } from '../scene-format.js';
 import { WebpError } from '../webp/bits.js';
 import { decodeWebp, webpSize, type WebpImage } from '../webp/decode.js';
 import { decodeNatively } from '../webp/native.js';
 
 /** Maximum number of pixels of a plane beyond one for each splat: rows and columns of padding. */
-const SPARE_PIXELS = 65_536;
+const EXTRA_PIXELS = 65_536;
 
 /** Opens the images of a SOG scene and decodes them, with limits on their size. */
 export class Planes {
-  readonly #open: OpenPart;
+  readonly #open: OpenFile;
   readonly #source: SceneSource;
   readonly #loaded = new Map<string, Promise<Uint8Array>>();
   /** The last decoded image, because names may repeat. */
   #last: { readonly file: string; readonly image: WebpImage } | undefined;
 
-  constructor(open: OpenPart, source: SceneSource) {
+  constructor(open: OpenFile, source: SceneSource) {
     this.#open = open;
     this.#source = source;
   }
@@ -37,7 +37,7 @@ export class Planes {
 
   /** A plane with one pixel for each splat: at least `count` pixels, and not many more. */
   async decodePlane(bytes: Uint8Array, file: string, count: number): Promise<Uint32Array> {
-    const { pixels } = await this.decode(bytes, file, 2 * count + SPARE_PIXELS);
+    const { pixels } = await this.decode(bytes, file, 2 * count + EXTRA_PIXELS);
     if (pixels.length < count) {
       throw damaged(
         `${this.#source.name}, ${file}`,

@@ -2,14 +2,14 @@ import { loadModule, type GaussianCloud, type ShDegree } from '@gaussian-splat/c
 import { grouped, startsWith } from '../bytes.js';
 import { allocateCloud, DEGREE_OF_REST_COUNT, type DraftCloud } from '../cloud.js';
 import { damaged, FLAT, warn } from '../faults.js';
-import { previewWanted, type OpenPart, type SceneSource } from '../scene-format.js';
+import { previewWanted, type OpenFile, type SceneSource } from '../scene-format.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
 import type { WebpImage } from '../webp/decode.js';
 import { parseSogMeta, type SogMeta } from './meta.js';
 import { Planes } from './planes.js';
 import {
   PALETTE_ROW,
-  unpackColours,
+  unpackColors,
   unpackHarmonics,
   unpackMeans,
   unpackQuats,
@@ -36,7 +36,7 @@ interface GeometryPlanes {
 }
 
 /** Reads the images that a `meta.json` names. */
-export async function readSogImages(meta: SogMeta, open: OpenPart, source: SceneSource): Promise<GaussianCloud> {
+export async function readSogImages(meta: SogMeta, open: OpenFile, source: SceneSource): Promise<GaussianCloud> {
   const { name } = source;
   const images = new Planes(open, source);
   const { count } = meta;
@@ -60,7 +60,7 @@ export async function readSogImages(meta: SogMeta, open: OpenPart, source: Scene
  * Reads one SOG of a streamed scene: its `meta.json`, or a bundle of all of its files. @param open Opens files relative
  * to it.
  */
-export async function readSogPart(source: SceneSource, open: OpenPart): Promise<GaussianCloud> {
+export async function readSogPart(source: SceneSource, open: OpenFile): Promise<GaussianCloud> {
   if (startsWith(source.bytes, 'PK\x03\x04')) {
     const { openBundle } = await loadModule('the code that reads bundles', () => import('../zip/bundle.js'));
     const bundle = openBundle(source);
@@ -74,11 +74,11 @@ async function decodeGeometry(images: Planes, meta: SogMeta, name: string): Prom
   const files = [...meta.means.files.slice(0, 2), meta.scales.files[0], meta.quats.files[0], meta.sh0.files[0]];
   const loaded = await Promise.all(files.map((file) => images.load(file)));
   const bytes = loaded.reduce((sum, file) => sum + file.length, 0);
-  const most = FREE_SPLATS + MAX_SPLATS_PER_BYTE * bytes;
-  if (meta.count > most) {
+  const max = FREE_SPLATS + MAX_SPLATS_PER_BYTE * bytes;
+  if (meta.count > max) {
     throw damaged(
       `${name}, count`,
-      `at most ${grouped(most)} splats in ${grouped(bytes)} bytes`,
+      `at most ${grouped(max)} splats in ${grouped(bytes)} bytes`,
       grouped(meta.count),
       'decode/header',
     );
@@ -106,7 +106,7 @@ function unpackGeometry(
   unpackMeans(planes.low, planes.high, meta.means, selection, cloud.positions);
   unpackScales(planes.scales, meta.scales, selection, cloud.scales);
   unpackQuats(planes.quats, selection, cloud.rotations);
-  unpackColours(planes.sh0, meta.sh0, selection, cloud);
+  unpackColors(planes.sh0, meta.sh0, selection, cloud);
   return cloud;
 }
 

@@ -66,7 +66,7 @@ export function unpackScales(
 }
 
 /** Constant coefficients and opacities. */
-export function unpackColours(
+export function unpackColors(
   plane: Uint32Array,
   { values }: SogMeta['sh0'],
   { count, step }: Selection,
@@ -97,19 +97,19 @@ export const PALETTE_ROW = 64;
 export function unpackHarmonics(labels: Uint32Array, palette: Palette, cloud: DraftCloud): void {
   const coefficients = shCoefficientCount(cloud.shDegree) - 1;
   const entry = 3 * coefficients;
-  const colours = new Float32Array(palette.size * entry);
+  const colors = new Float32Array(palette.size * entry);
   for (let k = 0; k < palette.size; k++) {
     const first = Math.floor(k / PALETTE_ROW) * PALETTE_ROW * coefficients + (k % PALETTE_ROW) * coefficients;
     for (let c = 0; c < coefficients; c++) {
       const pixel = palette.pixels[first + c];
-      colours[k * entry + 3 * c] = palette.values[red(pixel)];
-      colours[k * entry + 3 * c + 1] = palette.values[green(pixel)];
-      colours[k * entry + 3 * c + 2] = palette.values[blue(pixel)];
+      colors[k * entry + 3 * c] = palette.values[red(pixel)];
+      colors[k * entry + 3 * c + 1] = palette.values[green(pixel)];
+      colors[k * entry + 3 * c + 2] = palette.values[blue(pixel)];
     }
   }
   for (let i = 0; i < cloud.count; i++) {
     const label = red(labels[i]) | (green(labels[i]) << 8);
     if (label >= palette.size) continue;
-    cloud.sh.set(colours.subarray(label * entry, (label + 1) * entry), i * (entry + 3) + 3);
+    cloud.sh.set(colors.subarray(label * entry, (label + 1) * entry), i * (entry + 3) + 3);
   }
 }

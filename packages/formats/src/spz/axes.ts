@@ -16,7 +16,7 @@ const COORDINATE_SYSTEM = 0xadbe0003;
 const MEANINGLESS = new Set([0, 0xadbe0002]);
 /** Our own record of the order of splats: 1 for per-pixel. */
 const ORDER = 0x47530001;
-const MOST_SKIPPED = 8;
+const MAX_SKIPPED = 8;
 /** Number of fractional bits in the files of all converters. */
 const USUAL_FRACTIONAL_BITS = 12;
 
@@ -64,7 +64,7 @@ export function readExtensions(
     if (at + 8 + length > records.length) break;
     if (type === COORDINATE_SYSTEM && length >= 4) frame ??= frameOfSystem(view.getUint32(at + 8, true), name);
     else if (type === ORDER && length >= 4) order = view.getUint32(at + 8, true) === 1 ? 'pixel' : undefined;
-    else if (!MEANINGLESS.has(type) && skipped.size < MOST_SKIPPED) skipped.add(type);
+    else if (!MEANINGLESS.has(type) && skipped.size < MAX_SKIPPED) skipped.add(type);
     at += 8 + length;
   }
   return {

@@ -16,7 +16,7 @@ export interface SpzHeader {
 }
 
 /** The attributes in the order of the file. */
-export const SPZ_ATTRIBUTES = ['positions', 'opacities', 'colours', 'scales', 'rotations', 'harmonics'] as const;
+export const SPZ_ATTRIBUTES = ['positions', 'opacities', 'colors', 'scales', 'rotations', 'harmonics'] as const;
 export type SpzAttribute = (typeof SPZ_ATTRIBUTES)[number];
 
 /** Length of the header of versions 1 to 3, and of the part that version 4 shares with them. */
@@ -67,7 +67,7 @@ export function bytesPerSplat(version: number, degree: number): Readonly<Record<
   return {
     positions: version === 1 ? 6 : 9,
     opacities: 1,
-    colours: 3,
+    colors: 3,
     scales: 3,
     rotations: version >= 3 ? 4 : 3,
     harmonics: 3 * ((degree + 1) ** 2 - 1),

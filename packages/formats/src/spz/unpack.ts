@@ -8,7 +8,7 @@ import type { SceneSource } from '../scene-format.js';
 import type { PackedScene } from './streams.js';
 
 /** Colors are stored as 0.5 + 0.15·f_dc, which allows constant terms outside 0..1. */
-const COLOUR_SCALE = 0.15;
+const COLOR_SCALE = 0.15;
 
 /** Unpacks all attributes into a cloud (defined by `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
 export function unpackSplats(
@@ -30,7 +30,7 @@ export function unpackSplats(
   for (let i = 0; i < header.count; i++) cloud.opacities[i] = attributes.opacities[i] / 255;
   const shStride = 3 * shCoefficientCount(cloud.shDegree);
   for (let i = 0; i < 3 * header.count; i++) {
-    cloud.sh[shStride * Math.floor(i / 3) + (i % 3)] = (attributes.colours[i] / 255 - 0.5) / COLOUR_SCALE;
+    cloud.sh[shStride * Math.floor(i / 3) + (i % 3)] = (attributes.colors[i] / 255 - 0.5) / COLOR_SCALE;
   }
   unpackHarmonics(attributes.harmonics, header, axes, cloud.sh, shStride);
   return cloud;

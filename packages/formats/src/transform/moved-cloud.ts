@@ -15,7 +15,7 @@ export const isFar = (map: readonly number[]): boolean => [3, 7, 11].some((k) =>
  * they keep their precision.
  * @param map [3, 4], row-major: linear part and translation.
  */
-export function movedCloud(cloud: GaussianCloud, map: readonly number[]): GaussianCloud {
+export function applyMotion(cloud: GaussianCloud, map: readonly number[]): GaussianCloud {
   const { origin } = cloud;
   if ((!isFar(map) && origin.every((x) => x === 0)) || cloud.count === 0) {
     transformCloud(cloud, map);

@@ -168,12 +168,12 @@ const floats = (array: Float32Array<ArrayBuffer>, type: 'VEC3'): Accessor => ({
 /** Converts the sRGB colors of PLY files to linear colors of glTF. */
 function colorsOf(colors: Float32Array, alpha: Float32Array | undefined, { properties }: PlyElement): Accessor {
   const type = properties.find(({ name }) => COLOR[0].includes(name))!.type;
-  const most = { uint8: 255, uint16: 65_535, int32: 255, uint32: 255 }[type as string] ?? 1;
+  const max = { uint8: 255, uint16: 65_535, int32: 255, uint32: 255 }[type as string] ?? 1;
   const count = colors.length / 3;
   const linear = new Uint16Array(4 * count);
   for (let i = 0; i < count; i++) {
-    for (let k = 0; k < 3; k++) linear[4 * i + k] = Math.round(65_535 * linearOf(unit(colors[3 * i + k] / most)));
-    linear[4 * i + 3] = alpha ? Math.round(65_535 * unit(alpha[i] / most)) : 65_535;
+    for (let k = 0; k < 3; k++) linear[4 * i + k] = Math.round(65_535 * linearOf(unit(colors[3 * i + k] / max)));
+    linear[4 * i + 3] = alpha ? Math.round(65_535 * unit(alpha[i] / max)) : 65_535;
   }
   return { bytes: bytesOf(linear), json: { componentType: UNSIGNED_SHORT, normalized: true, count, type: 'VEC4' } };
 }

@@ -74,8 +74,8 @@ const largestOf = (regions: readonly Region[]): Region | undefined =>
 
 /** The lowest of the large floors, because a roof may be as large as the floor under it. */
 function lowestOf(regions: readonly Region[]): Region {
-  const most = largestOf(regions)?.cells.length ?? 0;
-  const large = regions.filter(({ cells }) => cells.length >= COMPARABLE * most);
+  const max = largestOf(regions)?.cells.length ?? 0;
+  const large = regions.filter(({ cells }) => cells.length >= COMPARABLE * max);
   return large.reduce((best, region) => (region.bottom < best.bottom ? region : best), large[0] ?? NOWHERE);
 }
 

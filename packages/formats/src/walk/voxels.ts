@@ -76,12 +76,12 @@ function readHead({ head, name, limits }: VoxelFiles): VoxelHead {
   );
   const found = /^(\d+)\.(\d+)$/.exec(String(version));
   if (found?.[1] !== '1') throw damaged(name, 'version 1.0 or 1.1', show(version), 'decode/unsupported');
-  const number = (path: string, value: unknown, least: number, most: number): number => {
-    if (typeof value === 'number' && value >= least && value <= most) return value;
-    throw damaged(`${name}, ${path}`, `a number from ${least} to ${most}`, show(value), 'decode/header');
+  const number = (path: string, value: unknown, lowest: number, highest: number): number => {
+    if (typeof value === 'number' && value >= lowest && value <= highest) return value;
+    throw damaged(`${name}, ${path}`, `a number from ${lowest} to ${highest}`, show(value), 'decode/header');
   };
-  const whole = (path: string, value: unknown, least: number, most: number): number => {
-    if (Number.isInteger(value)) return number(path, value, least, most);
+  const whole = (path: string, value: unknown, lowest: number, highest: number): number => {
+    if (Number.isInteger(value)) return number(path, value, lowest, highest);
     throw damaged(`${name}, ${path}`, 'a whole number', show(value), 'decode/header');
   };
   if (!isObject(gridBounds)) throw damaged(`${name}, gridBounds`, 'min and max', show(gridBounds), 'decode/header');

@@ -14,7 +14,7 @@ const PROBES = [
  */
 const PLAIN = [0x56, 0x50, 0x38, 0x4c];
 /** Minimum file size in bytes for the browser's decoder; ours is faster for smaller files. */
-const LEAST_BYTES = 4096;
+const MIN_BYTES = 4096;
 
 let isExact: Promise<boolean> | undefined;
 
@@ -27,7 +27,7 @@ export async function decodeNatively(
   file: Uint8Array,
   size: Pick<WebpImage, 'width' | 'height'>,
 ): Promise<WebpImage | undefined> {
-  if (file.length < LEAST_BYTES || PLAIN.some((byte, k) => file[12 + k] !== byte)) return undefined;
+  if (file.length < MIN_BYTES || PLAIN.some((byte, k) => file[12 + k] !== byte)) return undefined;
   if (typeof ImageDecoder !== 'function') return undefined;
   if (!(await (isExact ??= findExact()))) return undefined;
   const image = await decode(file).catch(() => undefined);

@@ -19,7 +19,7 @@ interface GroupMap {
 }
 
 /** Neighbors of the 120 shortest distance codes, as [columns to the left, rows up], in the order of RFC 9649. */
-const NEIGHBOURS: readonly number[] = [
+const NEIGHBORS: readonly number[] = [
   ...[0, 1, 1, 0, 1, 1, -1, 1, 0, 2, 2, 0, 1, 2, -1, 2, 2, 1, -2, 1, 2, 2, -2, 2, 0, 3, 3, 0, 1, 3, -1, 3, 3, 1, -3, 1],
   ...[2, 3, -2, 3, 3, 2, -3, 2, 0, 4, 4, 0, 1, 4, -1, 4, 4, 1, -4, 1, 3, 3, -3, 3, 2, 4, -2, 4, 4, 2, -4, 2, 0, 5],
   ...[3, 4, -3, 4, 4, 3, -4, 3, 5, 0, 1, 5, -1, 5, 5, 1, -5, 1, 2, 5, -2, 5, 5, 2, -5, 2, 4, 4, -4, 4, 3, 5, -3, 5],
@@ -37,7 +37,7 @@ export function readPixels(bits: BitReader, width: number, height: number, isMai
   const cacheBits = bits.read(1) === 1 ? bits.read(4) : 0;
   if (cacheBits > 11) throw new WebpError('a colour cache of more than 11 bits');
   const map = isMain && bits.read(1) === 1 ? readGroupMap(bits, width, height) : undefined;
-  const groupCount = map ? map.groups.reduce((most, group) => Math.max(most, group), 0) + 1 : 1;
+  const groupCount = map ? map.groups.reduce((max, group) => Math.max(max, group), 0) + 1 : 1;
   const groups = readGroups(bits, groupCount, cacheBits);
   const pixels = new Uint32Array(width * height);
   decode(bits, pixels, width, cacheBits, groups, map);
@@ -147,7 +147,7 @@ function decode(
 
 /** Number of pixels back for a distance code: the first 120 represent neighbors. */
 function distanceOf(code: number, width: number): number {
-  if (code > NEIGHBOURS.length / 2) return code - NEIGHBOURS.length / 2;
+  if (code > NEIGHBORS.length / 2) return code - NEIGHBORS.length / 2;
   const k = 2 * (code - 1);
-  return Math.max(1, NEIGHBOURS[k] + NEIGHBOURS[k + 1] * width);
+  return Math.max(1, NEIGHBORS[k] + NEIGHBORS[k + 1] * width);
 }

@@ -9,17 +9,17 @@ export interface Transform {
   readonly undo: (pixels: Uint32Array) => Uint32Array;
 }
 
-const [PREDICTOR, CROSS_COLOUR, SUBTRACT_GREEN] = [0, 1, 2];
+const [PREDICTOR, CROSS_COLOR, SUBTRACT_GREEN] = [0, 1, 2];
 
 /** Reads one transform of an image that is `width` pixels wide after the inversion. */
 export function readTransform(bits: BitReader, width: number, height: number): Transform {
   const type = bits.read(2);
   if (type === SUBTRACT_GREEN) return { type, storedWidth: width, undo: addGreen };
-  if (type === PREDICTOR || type === CROSS_COLOUR) {
+  if (type === PREDICTOR || type === CROSS_COLOR) {
     const blockBits = bits.read(3) + 2;
     const blocksAcross = Math.ceil(width / (1 << blockBits));
     const blocks = readPixels(bits, blocksAcross, Math.ceil(height / (1 << blockBits)), false);
-    const undo = type === PREDICTOR ? predict : addCrossColour;
+    const undo = type === PREDICTOR ? predict : addCrossColor;
     return { type, storedWidth: width, undo: (pixels) => undo(pixels, width, blocks, blockBits, blocksAcross) };
   }
   return readPalette(bits, type, width, height);
@@ -35,7 +35,7 @@ function addGreen(pixels: Uint32Array): Uint32Array {
 }
 
 /** Multipliers in 1/32 of green for red, of green for blue and of red for blue: bytes 0, 1 and 2 of a block. */
-function addCrossColour(
+function addCrossColor(
   pixels: Uint32Array,
   width: number,
   blocks: Uint32Array,

@@ -26,7 +26,7 @@ export class Archive {
     this.#name = name;
     this.#budget = budget;
     for (const entry of readDirectory(bytes, name)) {
-      const path = normalised(entry.path);
+      const path = normalized(entry.path);
       if (!isFolder(entry.path) && !this.#entries.has(path)) this.#entries.set(path, entry);
     }
   }
@@ -38,7 +38,7 @@ export class Archive {
 
   /** Inflated size of a file in bytes, as the directory declares. */
   lengthOf(path: string): number {
-    return this.#entries.get(normalised(path))?.bytes ?? 0;
+    return this.#entries.get(normalized(path))?.bytes ?? 0;
   }
 
   /**
@@ -47,7 +47,7 @@ export class Archive {
    * @param path May contain `.` and `..`.
    */
   open(path: string): Uint8Array {
-    const entry = this.#entries.get(normalised(path));
+    const entry = this.#entries.get(normalized(path));
     if (!entry) throw this.#missing(path);
     const where = `${this.#name}, ${path}`;
     if (entry.isEncrypted) throw damaged(where, 'a file without a password', 'an encrypted one', 'decode/unsupported');
@@ -102,7 +102,7 @@ const hex = (value: number): string => value.toString(16).padStart(8, '0');
 const isFolder = (path: string): boolean => /[\\/]$/.test(path);
 
 /** Resolves `.` and `..` of a path within the archive. */
-function normalised(path: string): string {
+function normalized(path: string): string {
   const parts: string[] = [];
   for (const part of path.replaceAll('\\', '/').split('/')) {
     if (part === '..') parts.pop();

@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { OpenPart, SceneSource } from '../scene-format.js';
+import type { OpenFile, SceneSource } from '../scene-format.js';
 import { Archive } from './archive.js';
 import { listed, namedLike, relevant } from './paths.js';
 
@@ -9,7 +9,7 @@ import { listed, namedLike, relevant } from './paths.js';
  */
 export function openBundle(source: Pick<SceneSource, 'bytes' | 'name' | 'budget'>): {
   bytes: Uint8Array;
-  open: OpenPart;
+  open: OpenFile;
 } {
   const archive = new Archive(source);
   const [path] = namedLike('meta.json', relevant(archive.paths));

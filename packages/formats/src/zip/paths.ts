@@ -12,7 +12,7 @@ export const namedLike = (name: string, paths: readonly string[]): string[] =>
 
 /** The least nested paths. */
 export function shallowest(paths: readonly string[]): string[] {
-  const depth = paths.reduce((least, path) => Math.min(least, depthOf(path)), Infinity);
+  const depth = paths.reduce((min, path) => Math.min(min, depthOf(path)), Infinity);
   return paths.filter((path) => depthOf(path) === depth);
 }
 

@@ -105,7 +105,7 @@ export class Batch {
     await endOfTask();
     const asked = this.#due().map((seat) => ({ seat, request: seat.takeRequest()!, inputs: seat.inputs }));
     try {
-      for (const group of groupInstances(asked, this.#varying, this.#steps.most)) await this.#runGroup(group);
+      for (const group of groupInstances(asked, this.#varying, this.#steps.max)) await this.#runGroup(group);
     } finally {
       for (const { seat } of asked) seat.settle();
     }

@@ -16,12 +16,12 @@ export function sharedInputs(inputs: Inputs, varying: ReadonlySet<string>): Inpu
 export function groupInstances<T extends { readonly inputs: Inputs }>(
   instances: readonly T[],
   varying: ReadonlySet<string>,
-  most: number,
+  max: number,
 ): T[][] {
   const groups: { readonly shared: Inputs; readonly members: T[] }[] = [];
   for (const instance of instances) {
     const shared = sharedInputs(instance.inputs, varying);
-    const group = groups.find((each) => each.members.length < most && sameInputs(each.shared, shared));
+    const group = groups.find((each) => each.members.length < max && sameInputs(each.shared, shared));
     if (group) group.members.push(instance);
     else groups.push({ shared, members: [instance] });
   }

@@ -25,7 +25,7 @@ export function stepOf(instances: number): number {
  */
 export class StepSessions {
   /** Maximum number of instances in one run: limited by the contract and the device's buffers. */
-  readonly most: number;
+  readonly max: number;
   readonly #session: GeneratorSession;
   readonly #steps = new Map<number, Step>();
   #runs = 0;
@@ -34,9 +34,9 @@ export class StepSessions {
   constructor(session: GeneratorSession) {
     this.#session = session;
     const { outputs, contract } = session.model;
-    const largest = Math.max(...outputs.map(({ most = 0, dtype }) => most * (dtype === 'float16' ? 2 : 4)));
+    const largest = Math.max(...outputs.map(({ max = 0, dtype }) => max * (dtype === 'float16' ? 2 : 4)));
     const room = Math.floor(session.device.limits.maxBufferSize / largest);
-    this.most = Math.max(1, Math.min(contract.instances!.most, room));
+    this.max = Math.max(1, Math.min(contract.instances!.most, room));
   }
 
   /** Session kind of the last run; undefined before. */
@@ -46,7 +46,7 @@ export class StepSessions {
 
   /** Returns the session for at least this many instances, and the number that it computes. */
   sessionFor(instances: number): { readonly session: GeneratorSession; readonly count: number } {
-    const count = Math.min(this.most, stepOf(instances));
+    const count = Math.min(this.max, stepOf(instances));
     let step = this.#steps.get(count);
     if (step === undefined) this.#steps.set(count, (step = { session: this.#session.forInstances(count), lastUse: 0 }));
     step.lastUse = ++this.#runs;

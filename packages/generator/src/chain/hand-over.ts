@@ -47,8 +47,8 @@ export class HandOver {
    */
   take({ tensors, dims, rows }: RunOutputs): void {
     const { layout, header } = this.#model;
-    const most = layout?.paddedRows ?? layout?.capacity ?? Infinity;
-    if (rows > most) throw tooManyRows(header.name, most, rows);
+    const max = layout?.paddedRows ?? layout?.capacity ?? Infinity;
+    if (rows > max) throw tooManyRows(header.name, max, rows);
     this.#version++;
     this.#rows = rows;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.generator.hand-over' });
@@ -79,10 +79,10 @@ export class HandOver {
   }
 
   #shaped(input: string, output: string, dims: readonly number[]): GpuTensor {
-    const { dtype: written, most } = this.#model.outputs.find(({ name }) => name === output)!;
+    const { dtype: written, max } = this.#model.outputs.find(({ name }) => name === output)!;
     // A 64-bit count feeds no input: `connect` requires the same type on both sides.
     const dtype = written as GpuTensor['dtype'];
-    const buffer = this.#bufferOf(input, bufferBytes(dtype, most ?? elementsOf(dims)));
+    const buffer = this.#bufferOf(input, bufferBytes(dtype, max ?? elementsOf(dims)));
     return { buffer, dtype, dims, version: this.#version };
   }
 

@@ -2,7 +2,7 @@ import { halfToNumber } from '@gaussian-splat/core';
 import type { AttributeSlice } from '@gaussian-splat/core/contract';
 
 /** A range of an output from the same run on GPU and CPU. */
-export interface ComparedPart {
+export interface OutputDifference {
   /** Name of the output. */
   readonly tensor: string;
   readonly dtype: 'float32' | 'float16' | 'int32';
@@ -35,7 +35,10 @@ export const isDifferent = ({ share }: Comparison): boolean => share > ALLOWED_S
  * @param attributes Location of the Gaussians in the outputs; none for an image.
  * @returns The attribute with the largest error.
  */
-export function compareParts(parts: readonly ComparedPart[], attributes: readonly AttributeSlice[] = []): Comparison {
+export function compareOutputs(
+  parts: readonly OutputDifference[],
+  attributes: readonly AttributeSlice[] = [],
+): Comparison {
   const comparisons = [...new Set(parts.map(({ tensor }) => tensor))].flatMap((tensor) => {
     const own = parts.filter((part) => part.tensor === tensor);
     const slices = attributes.filter((slice) => slice.tensor === tensor);
@@ -48,13 +51,13 @@ export function compareParts(parts: readonly ComparedPart[], attributes: readonl
 
 function compareAttribute(
   where: string,
-  parts: readonly ComparedPart[],
+  parts: readonly OutputDifference[],
   slice: AttributeSlice | undefined,
 ): Comparison {
   const pairs = parts.flatMap((part) => pairsOf(part, slice));
   const finite = pairs.map(([, expected]) => Math.abs(expected)).filter(Number.isFinite);
   const isAbsolute = slice?.activation === 'logit' || slice?.activation === 'log';
-  const scale = isAbsolute ? 1 : finite.reduce((most, value) => Math.max(most, value), 0) || 1;
+  const scale = isAbsolute ? 1 : finite.reduce((max, value) => Math.max(max, value), 0) || 1;
   const allowed = ALLOWED[parts[0]?.dtype ?? 'float32'];
   let error = 0;
   let beyond = 0;
@@ -76,7 +79,7 @@ const sigmoid = (logit: number): number => 1 / (1 + Math.exp(-logit));
 
 /** The numbers of an attribute in a range, found and expected. */
 function pairsOf(
-  { dtype, start, found, expected }: ComparedPart,
+  { dtype, start, found, expected }: OutputDifference,
   slice: AttributeSlice | undefined,
 ): [number, number][] {
   const [a, b] = [numbersOf(found, dtype), numbersOf(expected, dtype)];
@@ -92,7 +95,7 @@ function pairsOf(
   return pairs;
 }
 
-function numbersOf(bytes: Uint8Array, dtype: ComparedPart['dtype']): ArrayLike<number> {
+function numbersOf(bytes: Uint8Array, dtype: OutputDifference['dtype']): ArrayLike<number> {
   const { buffer, byteOffset, byteLength } = (
     bytes.byteOffset % 4 === 0 ? bytes : bytes.slice()
   ) as Uint8Array<ArrayBuffer>;

@@ -1,7 +1,7 @@
 import { loadRuntime } from '../runtime/load-runtime.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
-import { compareParts, isDifferent, type ComparedPart, type Comparison } from './compare.js';
-import { readRecord, recordKey, writeRecord, type Verdict } from './record.js';
+import { compareOutputs, isDifferent, type OutputDifference, type Comparison } from './compare.js';
+import { readRecord, recordKey, writeRecord, type CpuCheckResult } from './record.js';
 import { runInWorker, type CpuRun, type StartWorker } from './run-on-cpu.js';
 
 /** A run on the GPU, with ranges of its output. */
@@ -9,20 +9,20 @@ export interface Evidence {
   readonly feeds: CpuRun['feeds'];
   readonly dims: Readonly<Record<string, readonly number[]>>;
   readonly parts: readonly (CpuRun['parts'][number] & {
-    readonly dtype: ComparedPart['dtype'];
+    readonly dtype: OutputDifference['dtype'];
     readonly bytes: Uint8Array;
   })[];
 }
 
 /** Maximum bytes of weights and outputs of a compared model, because a worker holds a second copy. */
-const MOST_BYTES = 512 * 2 ** 20;
+const MAX_BYTES = 512 * 2 ** 20;
 
 /** Operators that draw random numbers, which cannot be compared. */
 const IS_RANDOM = /^(Random|Bernoulli|Multinomial)/;
 
 interface Known {
   readonly key: Promise<string | undefined>;
-  verdict: Promise<Verdict> | undefined;
+  verdict: Promise<CpuCheckResult> | undefined;
 }
 
 /** Keyed by the bytes of a model, because its sessions for other numbers of instances run the same computation. */
@@ -40,7 +40,7 @@ function knownOf(model: GeneratorModel, device: GPUDevice): Known {
 }
 
 /** Returns the result of an earlier visit or session, if there is one. */
-export async function earlierVerdict(model: GeneratorModel, device: GPUDevice): Promise<Verdict | undefined> {
+export async function earlierVerdict(model: GeneratorModel, device: GPUDevice): Promise<CpuCheckResult | undefined> {
   const entry = knownOf(model, device);
   const kept = readRecord(await entry.key);
   if (kept !== undefined) entry.verdict ??= Promise.resolve(kept);
@@ -57,14 +57,14 @@ export function prove(
   evidence: Evidence,
   signal: AbortSignal,
   startWorker?: StartWorker,
-): Promise<Verdict> {
+): Promise<CpuCheckResult> {
   const entry = knownOf(model, device);
   entry.verdict ??= compare(model, evidence, signal, startWorker).then(
     async (verdict) => {
       writeRecord(await entry.key, verdict);
       return verdict;
     },
-    (error: unknown): Verdict => {
+    (error: unknown): CpuCheckResult => {
       entry.verdict = undefined;
       const reason = `not compared with the CPU: ${error instanceof Error ? error.message : String(error)}`;
       return { result: 'unknown', reason };
@@ -78,11 +78,11 @@ async function compare(
   evidence: Evidence,
   signal: AbortSignal,
   startWorker?: StartWorker,
-): Promise<Verdict> {
+): Promise<CpuCheckResult> {
   const { header, contract, instances } = model;
-  const unknown = (why: string): Verdict => ({ result: 'unknown', reason: `not compared with the CPU: ${why}` });
+  const unknown = (why: string): CpuCheckResult => ({ result: 'unknown', reason: `not compared with the CPU: ${why}` });
   if ([...header.operators.keys()].some((name) => IS_RANDOM.test(name))) return unknown('it draws random numbers');
-  if (bytesOf(model) > MOST_BYTES) return unknown(`it takes more than ${MOST_BYTES} bytes`);
+  if (bytesOf(model) > MAX_BYTES) return unknown(`it takes more than ${MAX_BYTES} bytes`);
   await idle();
   signal.throwIfAborted();
   const runtime = await loadRuntime();
@@ -104,14 +104,14 @@ async function compare(
     if (String(dims) !== String(evidence.dims[name]))
       return unknown(`it writes ${String(dims)} there, not ${String(evidence.dims[name])}`);
   }
-  const compared = parts.map(({ tensor, dtype, offset, bytes }, i): ComparedPart => {
+  const compared = parts.map(({ tensor, dtype, offset, bytes }, i): OutputDifference => {
     const start = offset / (dtype === 'float16' ? 2 : 4);
     return { tensor, dtype, start, found: bytes, expected: outputs.parts[i] };
   });
-  return verdictOf(compareParts(compared, model.layout?.attributes));
+  return verdictOf(compareOutputs(compared, model.layout?.attributes));
 }
 
-function verdictOf(comparison: Comparison): Verdict {
+function verdictOf(comparison: Comparison): CpuCheckResult {
   const { error, where, share } = comparison;
   const figure = `${where} differ by up to ${error.toPrecision(2)} of the largest`;
   if (!isDifferent(comparison)) return { result: 'same', error, reason: `as on the CPU: ${figure}` };
@@ -125,7 +125,7 @@ function verdictOf(comparison: Comparison): Verdict {
 
 function bytesOf({ bytes, externalData, outputs }: GeneratorModel): number {
   const weights = externalData.reduce((sum, { data }) => sum + data.length, bytes.length);
-  return outputs.reduce((sum, { most = 0, dtype }) => sum + most * (dtype === 'float16' ? 2 : 4), weights);
+  return outputs.reduce((sum, { max = 0, dtype }) => sum + max * (dtype === 'float16' ? 2 : 4), weights);
 }
 
 /** Waits for the page to be idle, at most two seconds. */

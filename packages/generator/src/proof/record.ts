@@ -1,7 +1,7 @@
 import type { GeneratorModel } from '../runtime/open-model.js';
 
 /** Result of comparing a model's run on the GPU with its run on the CPU. */
-export interface Verdict {
+export interface CpuCheckResult {
   /** `unknown` if there was nothing to compare with. */
   readonly result: 'same' | 'different' | 'unknown';
   /**
@@ -33,9 +33,9 @@ export async function recordKey(
 }
 
 /** Returns the result of an earlier visit. */
-export function readRecord(key: string | undefined): Verdict | undefined {
+export function readRecord(key: string | undefined): CpuCheckResult | undefined {
   try {
-    const verdict = JSON.parse(pageStore()?.getItem(key ?? '') ?? 'null') as Verdict | null;
+    const verdict = JSON.parse(pageStore()?.getItem(key ?? '') ?? 'null') as CpuCheckResult | null;
     const isKnown = ['same', 'different', 'unknown'].includes(verdict?.result ?? '');
     return key !== undefined && isKnown && typeof verdict?.reason === 'string' ? verdict : undefined;
   } catch {
@@ -43,7 +43,7 @@ export function readRecord(key: string | undefined): Verdict | undefined {
   }
 }
 
-export function writeRecord(key: string | undefined, verdict: Verdict): void {
+export function writeRecord(key: string | undefined, verdict: CpuCheckResult): void {
   try {
     if (key !== undefined) pageStore()?.setItem(key, JSON.stringify(verdict));
   } catch {

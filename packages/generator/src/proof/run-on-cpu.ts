@@ -22,7 +22,7 @@ export interface CpuOutputs {
 const LIMIT_MS = 60_000;
 
 /** Message to a worker of {@link StartWorker}. */
-export interface CpuRunMessage {
+export interface CpuCheckMessage {
   readonly type: 'run-on-cpu';
   readonly script: string;
   readonly wasm: ArrayBuffer;
@@ -42,7 +42,7 @@ export type StartWorker = () => Worker;
  * Runs in the worker: executes the model, and posts its output. It uses only its arguments, because its source text is
  * the script of the default worker.
  */
-export async function answerCpuRun({ script, wasm, run }: CpuRunMessage): Promise<void> {
+export async function handleCpuRun({ script, wasm, run }: CpuCheckMessage): Promise<void> {
   const post = postMessage as (answer: Answer, transfer?: Transferable[]) => void;
   try {
     const ort = (await import(/* @vite-ignore */ /* webpackIgnore: true */ script)) as Ort;
@@ -76,7 +76,7 @@ export async function answerCpuRun({ script, wasm, run }: CpuRunMessage): Promis
 
 /** A same-origin worker that needs no support by bundlers. */
 function startOwnWorker(): Worker {
-  const text = `onmessage = ({ data }) => (${String(answerCpuRun)})(data);`;
+  const text = `onmessage = ({ data }) => (${String(handleCpuRun)})(data);`;
   const url = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
   try {
     return new Worker(url);
@@ -119,7 +119,7 @@ export function runInWorker(
       const { outputs, failure } = data;
       end(() => (outputs ? resolve(outputs) : reject(new Error(failure))));
     });
-    const message: CpuRunMessage = { type: 'run-on-cpu', script, wasm, run };
+    const message: CpuCheckMessage = { type: 'run-on-cpu', script, wasm, run };
     worker.postMessage(message);
   });
 }

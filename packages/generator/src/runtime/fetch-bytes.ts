@@ -49,13 +49,13 @@ export async function fetchBytes(
 
 /** Initial allocation for a file of unknown length, and the maximum for a declared length, bytes. */
 const FIRST_BYTES = 65_536;
-const MOST_AT_ONCE = 2 ** 28;
+const MAX_AT_ONCE = 2 ** 28;
 
 async function readBody(response: Response, { onProgress, expected }: FetchOptions): Promise<Uint8Array<ArrayBuffer>> {
   if (onProgress === undefined) return bytesOf(response);
   const length = Number(response.headers.get('Content-Length')) || undefined;
   const total = (response.headers.get('Content-Encoding') ? undefined : length) ?? expected;
-  let bytes = new Uint8Array(Math.min(total ?? FIRST_BYTES, MOST_AT_ONCE));
+  let bytes = new Uint8Array(Math.min(total ?? FIRST_BYTES, MAX_AT_ONCE));
   let loaded = 0;
   for await (const chunk of chunksOf(response)) {
     const end = loaded + chunk.length;

@@ -6,7 +6,7 @@ import { ELEMENT_BYTES, readTensors, TENSOR_USAGE } from './tensor-buffers.js';
 
 /** Size of the compared ranges of an output, and their maximum number, spread over the output. */
 const PIECE_BYTES = 65_536;
-const MOST_PIECES = 8;
+const MAX_PIECES = 8;
 
 /** Ranges of a run's output. */
 export interface WrittenRun {
@@ -24,7 +24,7 @@ export async function readRun(
     const bytes = elementsOf(dims[tensor]) * ELEMENT_BYTES[dtype];
     // More rows than declared do not exist in the buffer, and are rejected later.
     const size = Math.min(bytes - (bytes % 4), tensors[tensor].size);
-    const pieces = Math.min(MOST_PIECES, Math.ceil(size / PIECE_BYTES));
+    const pieces = Math.min(MAX_PIECES, Math.ceil(size / PIECE_BYTES));
     return Array.from({ length: Math.max(1, pieces) }, (_, i) => {
       const offset = pieces > 1 ? Math.floor(((size - PIECE_BYTES) * i) / (pieces - 1) / 4) * 4 : 0;
       // A 64-bit count is compared as two 32-bit numbers.

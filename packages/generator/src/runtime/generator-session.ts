@@ -2,7 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { ContractError, ofInstances, oneInstance } from '@gaussian-splat/core/contract';
 import type { OnnxHeader } from '@gaussian-splat/core/onnx';
 import { bindInputs } from '../bind-inputs.js';
-import { bindPictures } from '../bind-pictures.js';
+import { bindImages } from '../bind-images.js';
 import type { Inputs } from '../input-value.js';
 import type { GeneratorState } from '../state.js';
 import { WeightRelease } from './cadence.js';
@@ -11,7 +11,7 @@ import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { earlierVerdict, prove, type Evidence } from '../proof/prove.js';
 import type { StartWorker } from '../proof/run-on-cpu.js';
-import type { Verdict } from '../proof/record.js';
+import type { CpuCheckResult } from '../proof/record.js';
 import { ELEMENT_BYTES } from './tensor-buffers.js';
 import { runFault, startSession } from './start-session.js';
 
@@ -21,7 +21,7 @@ const MAX_FAILURES = 2;
 const FIRST_REST_MS = 250;
 const LONGEST_REST_MS = 2_000;
 /** Maximum number of copies of the runtime that other models may break while one run is tried. */
-const MOST_COPIES = 5;
+const MAX_COPIES = 5;
 
 /**
  * A generator on one device: one session of the runtime, shared by all its users. A failed run ends the runtime's
@@ -46,7 +46,7 @@ export class GeneratorSession {
   #isReleased = false;
   /** Reason that the GPU is not used any more. */
   #refusal: string | undefined;
-  #verdict: Verdict | undefined;
+  #verdict: CpuCheckResult | undefined;
 
   /**
    * @param onFallback Called once if the model has to run on the CPU.
@@ -79,7 +79,7 @@ export class GeneratorSession {
   }
 
   /** Result of the comparison with the CPU; undefined until some seconds after the first run. */
-  get verdict(): Verdict | undefined {
+  get verdict(): CpuCheckResult | undefined {
     return this.#verdict;
   }
 
@@ -91,7 +91,7 @@ export class GeneratorSession {
   bind(state: GeneratorState, given: ReadonlySet<string> = new Set()): Inputs {
     const { contract } = this.model;
     const header = this.#oneInstance;
-    return { ...bindInputs(header, contract, state), ...bindPictures(header, contract, state, given) };
+    return { ...bindInputs(header, contract, state), ...bindImages(header, contract, state, given) };
   }
 
   /**
@@ -104,7 +104,7 @@ export class GeneratorSession {
       ...rest,
       contract,
       header: ofInstances(header, contract, count),
-      outputs: outputs.map((output) => ({ ...output, most: output.most && output.most * count })),
+      outputs: outputs.map((output) => ({ ...output, max: output.max && output.max * count })),
       instances: count,
     };
     return new GeneratorSession(model, this.device, this.#onFallback, this.#compare);
@@ -122,7 +122,7 @@ export class GeneratorSession {
         return await this.#runOnce(inputs, use);
       } catch (error) {
         // Another model has broken this session's copy of the runtime: it starts again in the next copy.
-        if (!(error instanceof RuntimeGone) || copies === MOST_COPIES) throw error;
+        if (!(error instanceof RuntimeGone) || copies === MAX_COPIES) throw error;
       }
     }
   }
@@ -290,8 +290,8 @@ class FirstUse {
 
 /** The runtime keeps each output in one buffer. */
 function requireRoom({ header, outputs }: GeneratorModel, { limits }: GPUDevice): void {
-  for (const { name, dtype, most = 0 } of outputs) {
-    const bytes = most * ELEMENT_BYTES[dtype];
+  for (const { name, dtype, max = 0 } of outputs) {
+    const bytes = max * ELEMENT_BYTES[dtype];
     if (bytes <= limits.maxBufferSize) continue;
     throw new GaussianSplatError('out-of-memory/buffer-limit', {
       where: `output ${name} of ${header.name}`,

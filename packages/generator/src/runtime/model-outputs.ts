@@ -10,7 +10,7 @@ export interface ModelOutput {
   /** Elements in each row of Gaussians. */
   readonly rowElements?: number;
   /** Maximum number of elements in a run; undefined for an image whose size only a run determines. */
-  readonly most: number | undefined;
+  readonly max: number | undefined;
 }
 
 /** The outputs that a contract names. @param layout Of the Gaussians, if the model writes any. */
@@ -24,7 +24,7 @@ export function modelOutputs(
     if (input.role !== 'state' || written.some(({ name }) => name === input.output)) return [];
     const { dims, dtype } = header.outputs.find(({ name }) => name === input.output)!;
     return [
-      { name: input.output, kind: 'state', dtype: dtype as ModelOutput['dtype'], most: elementsOf(dims as number[]) },
+      { name: input.output, kind: 'state', dtype: dtype as ModelOutput['dtype'], max: elementsOf(dims as number[]) },
     ];
   });
   return [...written, ...states];
@@ -35,15 +35,15 @@ function writtenOutputs(header: OnnxHeader, { outputs }: Contract, layout: Gauss
   const { attributes = [], capacity = 0, paddedRows = capacity, dtype = 'float32', count, countDtype } = layout ?? {};
   const strides = new Map(attributes.map(({ tensor, rowStride }) => [tensor, rowStride]));
   const found: ModelOutput[] = [...strides].map(([name, rowElements]) => {
-    return { name, kind: 'gaussians', dtype, most: paddedRows * rowElements, rowElements };
+    return { name, kind: 'gaussians', dtype, max: paddedRows * rowElements, rowElements };
   });
-  if (count !== undefined) found.push({ name: count, kind: 'count', dtype: countDtype ?? 'int32', most: 1 });
+  if (count !== undefined) found.push({ name: count, kind: 'count', dtype: countDtype ?? 'int32', max: 1 });
   return found;
 }
 
 function imageOutput(header: OnnxHeader, name: string): ModelOutput {
   const { dtype, dims } = header.outputs.find((output) => output.name === name)!;
   const isFixed = dims?.every((dim) => typeof dim === 'number') ?? false;
-  const most = isFixed ? elementsOf((dims ?? []) as number[]) : undefined;
-  return { name, kind: 'image', dtype: dtype as 'float32' | 'float16', most };
+  const max = isFixed ? elementsOf((dims ?? []) as number[]) : undefined;
+  return { name, kind: 'image', dtype: dtype as 'float32' | 'float16', max };
 }

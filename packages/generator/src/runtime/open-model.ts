@@ -91,12 +91,12 @@ export async function openModel(
 }
 
 /** Maximum size of a contract, which has some kilobytes including a rest pose. */
-const MOST_CONTRACT_BYTES = 1 << 20;
+const MAX_CONTRACT_BYTES = 1 << 20;
 
 const longContract = (where: string, found: number): GaussianSplatError =>
   new GaussianSplatError('out-of-memory/budget', {
     where: `${where}, the contract beside it`,
-    expected: `at most ${MOST_CONTRACT_BYTES} bytes`,
+    expected: `at most ${MAX_CONTRACT_BYTES} bytes`,
     found: String(found),
     remedy: 'write the contract without what no reader needs',
   });
@@ -107,7 +107,7 @@ async function contractOf(source: ModelSource, header: OnnxHeader, request: Fetc
   if (carriesContract(header)) return resolveContract({ header });
   if (/^(data|blob):/.test(source.url)) return resolveContract({ header });
   const bytes = await fetchBytes(sidecarName(source.url), { ...request, mayBeMissing: true });
-  if (bytes && bytes.length > MOST_CONTRACT_BYTES) throw longContract(source.url, bytes.length);
+  if (bytes && bytes.length > MAX_CONTRACT_BYTES) throw longContract(source.url, bytes.length);
   const text = bytes && new TextDecoder().decode(bytes);
   // Servers of single-page applications respond with their page for missing files.
   const sidecar = text === undefined || /^\s*</.test(text) ? undefined : text;
@@ -115,14 +115,14 @@ async function contractOf(source: ModelSource, header: OnnxHeader, request: Fetc
 }
 
 /** Maximum number of weight files: exporters write one, or one for each large tensor on request. */
-const MOST_FILES = 256;
+const MAX_FILES = 256;
 /** Maximum number of concurrent downloads, so that other requests of the page can proceed. */
 const FILES_AT_ONCE = 4;
 
 function tooManyFiles({ name, externalFiles }: OnnxHeader): GaussianSplatError {
   return new GaussianSplatError('decode/unsupported', {
     where: name,
-    expected: `at most ${MOST_FILES} files of weights beside a model`,
+    expected: `at most ${MAX_FILES} files of weights beside a model`,
     found: String(externalFiles.length),
     remedy: 'write the weights into one file: onnx.save_model(model, path, save_as_external_data=True)',
   });
@@ -135,7 +135,7 @@ async function fetchExternal(
   request: FetchOptions,
   reports: readonly ProgressListener[],
 ): Promise<GeneratorModel['externalData']> {
-  if (header.externalFiles.length > MOST_FILES) throw tooManyFiles(header);
+  if (header.externalFiles.length > MAX_FILES) throw tooManyFiles(header);
   const files: { path: string; data: Uint8Array<ArrayBuffer> | undefined }[] = [];
   let next = 0;
   const fetchSome = async (): Promise<void> => {

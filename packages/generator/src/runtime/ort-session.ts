@@ -217,10 +217,10 @@ export class OrtSession {
   }
 
   /** Outputs on the CPU; empty ones are on the CPU for any kind of session. */
-  #upload({ name, most }: ModelOutput, { type, data, size }: Tensor): GPUBuffer {
-    const buffer = this.#buffers.of(`output.${name}`, bufferBytes(type, most ?? size));
+  #upload({ name, max }: ModelOutput, { type, data, size }: Tensor): GPUBuffer {
+    const buffer = this.#buffers.of(`output.${name}`, bufferBytes(type, max ?? size));
     // The consumer rejects more than the contract allows.
-    if (size > 0 && size <= (most ?? size)) this.#buffers.write(buffer, data as Float32Array<ArrayBuffer>);
+    if (size > 0 && size <= (max ?? size)) this.#buffers.write(buffer, data as Float32Array<ArrayBuffer>);
     return buffer;
   }
 }

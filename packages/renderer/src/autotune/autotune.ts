@@ -15,7 +15,7 @@ export interface AutotuneOptions {
 
 export interface StartOptions extends AutotuneOptions {
   /** Upper limit in milliseconds of a small frame with the preferred variants; default 8. */
-  readonly quickMs?: number;
+  readonly maxFrameMs?: number;
 }
 
 /** Autotuning of one device, running or finished. */
@@ -40,17 +40,17 @@ const loadTiming = (): Promise<typeof trials> => loadModule('the self-test of th
  * takes seconds. A page that got preferred variants may autotune later, at rest.
  * @throws GaussianSplatError as {@link autotune}
  */
-export function startVariants(device: GPUDevice, options: StartOptions = {}): Promise<Variants> {
+export function pickInitialVariants(device: GPUDevice, options: StartOptions = {}): Promise<Variants> {
   const choice = choiceOf(device);
   return (choice.started ??= choice.chosen ?? start(device, options, choice));
 }
 
 async function start(device: GPUDevice, options: StartOptions, choice: Choice): Promise<Variants> {
-  const { store = pageStore(), quickMs = QUICK_MS, format } = options;
+  const { store = pageStore(), maxFrameMs = QUICK_MS, format } = options;
   const isOpen = !device.adapterInfo?.isFallbackAdapter && readStored(store, device) === undefined;
   const isGood =
     isOpen &&
-    (await measured('start', async () => (await loadTiming()).isGoodStart(device, PREFERRED, quickMs, format)));
+    (await measured('start', async () => (await loadTiming()).isGoodStart(device, PREFERRED, maxFrameMs, format)));
   if (!isGood) return autotune(device, options);
   if (!choice.chosen) setVariants(device, PREFERRED);
   return PREFERRED;

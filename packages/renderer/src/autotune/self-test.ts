@@ -14,12 +14,12 @@ import type { ShPrecision } from '../pack/words.js';
 /** Maximum error of a pixel: float16 blending stays a tenth below it. */
 const TOLERANCE = 0.02;
 /** Maximum mean squared error of the self-test, 59 dB PSNR. */
-const MOST_ERROR = 10 ** -5.9;
+const MAX_ERROR = 10 ** -5.9;
 /**
  * Maximum mean error of colors. Blending that rounds to nearest has 1e-6, a float16 that truncates 1e-4: an error of one
  * sign grows with the number of layers, to 42 dB PSNR inside a room.
  */
-const MOST_BIAS = 2e-5;
+const MAX_BIAS = 2e-5;
 /** Number of large splats, which cover much of the image. */
 const LARGE = 24;
 /**
@@ -77,7 +77,7 @@ function isNear(pixels: Float32Array, expected: Float64Array): boolean {
     if (i % 4 < 3) bias += error;
     if (expected[i | 3] > 0) covered++;
   }
-  return sum <= MOST_ERROR * covered && Math.abs(bias) <= MOST_BIAS * covered;
+  return sum <= MAX_ERROR * covered && Math.abs(bias) <= MAX_BIAS * covered;
 }
 
 /** A viewpoint of these scenes only. */
@@ -240,4 +240,4 @@ function projectSphere(
   };
 }
 
-const clamp = (value: number, most: number): number => Math.min(most, Math.max(-most, value));
+const clamp = (value: number, max: number): number => Math.min(max, Math.max(-max, value));

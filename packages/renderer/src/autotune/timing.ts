@@ -61,13 +61,13 @@ const SMALL: TimingScene = { scene: () => packSpheres(sphereCloud(4_000, 0.46), 
 export async function isGoodStart(
   device: GPUDevice,
   variants: Variants,
-  quickMs: number,
+  maxFrameMs: number,
   format?: GPUTextureFormat,
 ): Promise<boolean> {
   if (!(await passes(device, variants, format))) return false;
   const clock = await FrameClock.on(device);
   // Uses the target of the self-test, so that no pipeline is compiled for this trial alone.
-  return (await timeFrames(device, variants, SMALL, clock, ANSWER_TARGET)) <= quickMs;
+  return (await timeFrames(device, variants, SMALL, clock, ANSWER_TARGET)) <= maxFrameMs;
 }
 
 /** Milliseconds per frame over a few consecutive frames. */

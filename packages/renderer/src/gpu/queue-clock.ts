@@ -13,8 +13,8 @@ const TOGETHER_MS = 1;
 export interface WorkTime {
   /** End of the work, by the page's clock. */
   readonly doneAt: number;
-  readonly atLeast: number;
-  readonly atMost: number;
+  readonly lowerBound: number;
+  readonly upperBound: number;
 }
 
 /**
@@ -82,17 +82,17 @@ export class QueueClock {
     const { now, since, before } = await this.done();
     // The latency is the shortest time ever measured.
     this.#latency = Math.min(this.#latency, now - submitted);
-    const atMost = this.spent(before.since, submitted, now);
-    const atLeast = Math.min(atMost, this.spent(before.now, submitted, since));
+    const upperBound = this.spent(before.since, submitted, now);
+    const lowerBound = Math.min(upperBound, this.spent(before.now, submitted, since));
     // If several results are reported together, the first seems to take the time of all.
     const isTogether = before.now > submitted && now - this.#together.now < TOGETHER_MS;
     const together = isTogether ? this.#together : (this.#together = { now, count: 0, milliseconds: 0 });
     together.count++;
-    together.milliseconds += atMost;
+    together.milliseconds += upperBound;
     await new Promise((resolve) => setTimeout(resolve));
-    if (together.count === 1) return { doneAt: now, atLeast, atMost };
+    if (together.count === 1) return { doneAt: now, lowerBound, upperBound };
     const share = together.milliseconds / together.count;
-    return { doneAt: now, atLeast: Math.min(atLeast, share), atMost: share };
+    return { doneAt: now, lowerBound: Math.min(lowerBound, share), upperBound: share };
   }
 
   /**

@@ -107,7 +107,7 @@ export class SpanTimer implements FrameTimer {
 }
 
 /** Plausible maximum of a frame, ms. */
-const MOST_MS = 60_000;
+const MAX_MS = 60_000;
 
 /**
  * Returns the begin and the duration of a frame. A frame may be shorter than the resolution of the clock, 100 µs in
@@ -123,5 +123,5 @@ export function spanOf(stamps: BigUint64Array, before: bigint): [begin: bigint, 
     if (stamps[i + 1] > end) end = stamps[i + 1];
   }
   const milliseconds = Number(end - begin) / 1e6;
-  return [begin, begin > before && milliseconds >= 0 && milliseconds < MOST_MS ? milliseconds : null];
+  return [begin, begin > before && milliseconds >= 0 && milliseconds < MAX_MS ? milliseconds : null];
 }

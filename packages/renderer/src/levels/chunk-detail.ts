@@ -88,13 +88,13 @@ export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: Chu
     // Centers far from the origin are rounded themselves.
     const rounded = 1e-6 * Math.hypot(x, y, z);
     spheres.set([x, y, z, radius * STRICTLY + rounded], 4 * c);
-    errors[c] = Math.max(error * STRICTLY, LEAST_ERROR);
+    errors[c] = Math.max(error * STRICTLY, MIN_ERROR);
   }
   return { count, spheres, errors };
 }
 
 /** Minimum error of a merge, even without displacement, so that a threshold of 0 draws the leaves. */
-const LEAST_ERROR = 1e-20;
+const MIN_ERROR = 1e-20;
 
 /** Twice the root mean square displacement of the splats that were merged in a chunk; nearly all are displaced less. */
 function ownError({ count, spreads }: SplatLevel, chunk: number): number {

@@ -1,6 +1,6 @@
 import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import { GaussianBuffers, type UploadOptions } from '../gaussian-buffers.js';
-import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
+import type { GaussianBlock, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
@@ -22,7 +22,7 @@ export class DetailedGaussians implements GaussianScene {
   /** Variance in px² of the screen-space low-pass filter of training; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly #leaves: GaussianScene;
   readonly #coarser: GaussianBuffers;
   readonly #memory: GpuMemory;
@@ -90,7 +90,7 @@ export class DetailedGaussians implements GaussianScene {
 }
 
 /** The same blocks, each with the rows of its chunks. */
-function withDetails(pages: readonly GaussianPage[], details: Float32Array, memory: GpuMemory): GaussianPage[] {
+function withDetails(pages: readonly GaussianBlock[], details: Float32Array, memory: GpuMemory): GaussianBlock[] {
   const words = new Uint32Array(details.buffer, details.byteOffset, details.length);
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
   let start = 0;

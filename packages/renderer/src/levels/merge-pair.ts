@@ -27,11 +27,11 @@ import {
 export const coverOfOpacity = (opacity: number): number => (opacity <= 1 ? opacity : 1 + Math.log(opacity));
 
 /** Maximum coverage of a splat: opacities end at e. */
-const MOST_COVER = 2;
+const MAX_COVER = 2;
 
 /** Opacity of a splat with this coverage of its area. */
 export function opacityOfCover(cover: number): number {
-  return cover <= 1 ? cover : Math.exp(Math.min(MOST_COVER, cover) - 1);
+  return cover <= 1 ? cover : Math.exp(Math.min(MAX_COVER, cover) - 1);
 }
 
 /** Weight of the displacement of a splat if the colors differ by 1 in a channel. */

@@ -53,13 +53,13 @@ export class BlockReducer {
   }
 
   /** Merges at most this many pairs; always at least one, because the cheapest pair is mutual. */
-  #mergePairs(block: Block, most: number): void {
+  #mergePairs(block: Block, max: number): void {
     const best = this.#best;
     const partOf = this.#partOf;
     partOf.fill(-1, 0, block.count);
-    const limit = this.#dearest(block.count, most);
+    const limit = this.#dearest(block.count, max);
     let merged = 0;
-    for (let i = 0; i < block.count && merged < most; i++) {
+    for (let i = 0; i < block.count && merged < max; i++) {
       const j = best[i];
       if (j <= i || best[j] !== i || this.#bestCost[i] > limit) continue;
       mergePair(block.rows, ROW * i, ROW * j, block.dilation);
@@ -93,13 +93,13 @@ export class BlockReducer {
   }
 
   /** Cost of the most expensive pair that is merged in this round. */
-  #dearest(count: number, most: number): number {
+  #dearest(count: number, max: number): number {
     const costs = this.#pairCosts;
     let pairs = 0;
     for (let i = 0; i < count; i++) {
       const j = this.#best[i];
       if (j > i && this.#best[j] === i) costs[pairs++] = this.#bestCost[i];
     }
-    return pairs <= most ? Infinity : costs.subarray(0, pairs).sort()[most - 1];
+    return pairs <= max ? Infinity : costs.subarray(0, pairs).sort()[max - 1];
   }
 }

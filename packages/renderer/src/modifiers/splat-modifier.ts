@@ -10,7 +10,7 @@ import type { SplatProgram } from './splat-program.js';
 import type { SplatUniform } from './splat-shader.js';
 
 /** Maximum number of cuts of one scene. */
-export const MOST_CUTS: number = constants.MOST_CUTS;
+export const MAX_CUTS: number = constants.MAX_CUTS;
 
 /** Changes that a {@link SplatModifier} applies. */
 export interface SplatChanges {
@@ -69,7 +69,7 @@ export class SplatModifier implements PlacementModifier {
     const { shader } = this.program;
     const row = (k: number): Float64Array => toViewer.subarray(4 * k, 4 * k + 4);
     const column = (k: number): number[] => [fromViewer[k], fromViewer[4 + k], fromViewer[8 + k]];
-    const used = cuts.slice(0, MOST_CUTS);
+    const used = cuts.slice(0, MAX_CUTS);
     const moves = grown < 1 || share < 1 || used.some(({ offset }) => offset?.some((by) => by !== 0));
     const moved = directionIn(toLocal, center).map((at, k) => at + toLocal[4 * k + 3]);
     const values = {

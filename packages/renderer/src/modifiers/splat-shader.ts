@@ -44,7 +44,7 @@ const withoutComments = (code: string): string =>
  * Returns the text of the hook.
  * @param name Name of the function that the stages call.
  * @param others Text of a stage, whose names the hook must not redeclare.
- * @param mostValues Parameter count of the array of values.
+ * @param maxValues Parameter count of the array of values.
  * @throws GaussianSplatError `argument/splat-shader`
  */
 export function hookText({ code, uniforms = {} }: SplatShader, name: string, others: string): string {
@@ -55,19 +55,19 @@ export function hookText({ code, uniforms = {} }: SplatShader, name: string, oth
     throw refused('functions, structs and constants alone', `"${forbidden[0].trim()}"${lineAt(own, forbidden.index)}`);
   if (!/\bfn\s+modify\s*\(/.test(own)) throw refused('a function `modify`', 'none');
   const entries = Object.entries(uniforms);
-  if (entries.length > constants.MOST_VALUES)
-    throw refused(`at most ${constants.MOST_VALUES} uniforms`, `${entries.length}`);
+  if (entries.length > constants.MAX_VALUES)
+    throw refused(`at most ${constants.MAX_VALUES} uniforms`, `${entries.length}`);
   for (const [key, value] of entries)
     if (!NAME.test(key) || key === 'time' || !TYPES[sizeOf(value)])
       throw refused('uniforms that are numbers or vectors of 2 to 4, by names of WGSL other than `time`', `"${key}"`);
   const fields = entries.map(([key, value]) => `${key}: ${TYPES[sizeOf(value)]},`);
   const values = entries.map(([, value], k) => `, v[${k}]${['', '.x', '.xy', '.xyz', ''][sizeOf(value)]}`);
-  const most = constants.MOST_VALUES;
+  const max = constants.MAX_VALUES;
   // The text of the page starts on a new line, so that line numbers in errors can be converted.
   return [
     'struct Splat { position: vec3f, color: vec3f, opacity: f32, scale: f32 }',
     `struct Uniforms { time: f32, ${fields.join(' ')} }`,
-    `fn ${name}(p: vec3f, c: vec3f, o: f32, t: f32, v: array<vec4f, ${most}>) -> mat3x3f {`,
+    `fn ${name}(p: vec3f, c: vec3f, o: f32, t: f32, v: array<vec4f, ${max}>) -> mat3x3f {`,
     `let s = page_modify(Splat(p, c, o, 1.0), Uniforms(t${values.join('')}));`,
     'return mat3x3f(s.position, s.color, vec3f(s.opacity, s.scale, 0.0));',
     '}',

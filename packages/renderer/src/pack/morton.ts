@@ -10,7 +10,7 @@ const SAMPLE = 4096;
 /** A scene counts as made of planes or layers if this fraction of its splats has the same coordinate. */
 const FLAT_SHARE = 0.01;
 /** Minimum number of splats for reordering. */
-const LEAST_COUNT = 1024;
+const MIN_COUNT = 1024;
 
 /**
  * A Z-order curve through a scene, fitted to a sample of its splats on each axis. The curve is logarithmic far out, so
@@ -26,7 +26,7 @@ export type Curve = readonly Axis[];
  * @param samples Number of sampled splats.
  */
 export function curveThrough(positions: Float32Array, kept: Uint32Array, samples = SAMPLE): Curve | undefined {
-  if (kept.length < LEAST_COUNT) return undefined;
+  if (kept.length < MIN_COUNT) return undefined;
   const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis, samples));
   return axes.some(isFlat) ? undefined : axes;
 }

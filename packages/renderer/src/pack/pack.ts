@@ -10,7 +10,7 @@ import { constants } from '../generated/shaders.js';
 import { boundChunks } from './chunks.js';
 import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
-import { recentred } from './recentre.js';
+import { recentered } from './recenter.js';
 import { choosePrecision, noiseIn, packSh } from './sh.js';
 import { GEOMETRY_WORDS, SH_PRECISION, type ShPrecision } from './words.js';
 
@@ -69,7 +69,7 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(given);
-  const cloud = recentred(given);
+  const cloud = recentered(given);
   const { shDegree, antialiased, filterVariance, origin } = cloud;
   const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;

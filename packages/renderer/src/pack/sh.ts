@@ -149,7 +149,7 @@ const bitsOf = ({ buffer, byteOffset, length }: Float32Array): Int32Array => new
  * Bits of the largest number that a scale covers. The factor is slightly below 1 because a number equal to a step must
  * not round up to the next one.
  */
-const MOST_BITS = bitsOf(Float32Array.from({ length: MAX_CODE }, (_, code) => scaleOf(code + 1e-6)));
+const MAX_BITS = bitsOf(Float32Array.from({ length: MAX_CODE }, (_, code) => scaleOf(code + 1e-6)));
 /** The upper 12 bits of a float32, for a scale of code 0. */
 const FIRST_EIGHTH = (127 - SCALE_BIAS) * SCALE_STEPS;
 
@@ -162,6 +162,6 @@ function scaleCodeOf(bits: Int32Array, first: number, end: number): number {
   }
   // The first estimate is not too large, because log2(1 + m) is at least m for m in 0..1.
   let code = Math.max(0, (largest >>> 20) - FIRST_EIGHTH);
-  while (largest > MOST_BITS[code]) code++;
+  while (largest > MAX_BITS[code]) code++;
   return Math.min(MAX_CODE, code);
 }

@@ -15,7 +15,7 @@ import { constants } from '../generated/shaders.js';
 import { reachOf } from './chunks.js';
 import { codesAlong, curveThrough, isOfPlanes, type Curve } from './morton.js';
 import { packGeometry, usableIndices, type PackedGaussians, type PackedHead, type PackOptions } from './pack.js';
-import { recentred } from './recentre.js';
+import { recentered } from './recenter.js';
 import { sortByKey } from './radix-sort.js';
 import { noiseIn, packSh, PART, precisionFor } from './sh.js';
 import { unpackSplat } from './unpack.js';
@@ -24,7 +24,7 @@ import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from './word
 const { CULL_GROUP } = constants;
 
 /** Maximum number of splats in a shard. */
-export const SHARE_SPLATS = 1 << 14;
+export const SHARD_SPLATS = 1 << 14;
 /** Cells are identified by the highest bits of the codes along the curve. */
 const CELL_BITS = 9;
 const CELLS = 1 << CELL_BITS;
@@ -47,7 +47,7 @@ export interface ShareLayout {
 }
 
 /** Splats, each with all of its words contiguous. Its buffers are transferable. */
-export interface PackedShare {
+export interface PackedShard {
   readonly count: number;
   readonly words: Uint32Array<ArrayBuffer>;
   /** [CELLS] the end index of each cell's splats, in sequence. Empty for a scene that keeps its order. */
@@ -73,11 +73,11 @@ export interface SortedBlock {
 }
 
 /** Properties of a scene that are not stored with its splats. */
-export type ShareFacts = Pick<PackedGaussians, 'antialiased' | 'filterVariance' | 'origin' | 'droppedCount'>;
+export type ShardInfo = Pick<PackedGaussians, 'antialiased' | 'filterVariance' | 'origin' | 'droppedCount'>;
 
 /** Derives the layout of a scene from some of its splats. */
 export function layoutOf(cloud: GaussianCloud, shPrecision: ShPrecision): ShareLayout {
-  const near = recentred(cloud);
+  const near = recentered(cloud);
   const moved = near.origin.map((x, axis) => x - cloud.origin[axis]) as unknown as Vector3;
   return { shDegree: cloud.shDegree, shPrecision, moved, curve: curveThrough(near.positions, usableIndices(near)) };
 }
@@ -86,7 +86,7 @@ const wordsOf = ({ shDegree, shPrecision }: ShareLayout): number =>
   GEOMETRY_WORDS + shWords(shDegree, shPrecision) + FACT_WORDS;
 
 /** Packs at most {@link SHARD_SPLATS} splats. Unusable ones are dropped. */
-export function packShare(given: GaussianCloud, layout: ShareLayout): PackedShare {
+export function packShard(given: GaussianCloud, layout: ShareLayout): PackedShard {
   const { moved, curve, shPrecision, shDegree } = layout;
   const isMoved = moved.some((x) => x !== 0);
   const cloud = isMoved ? { ...given, positions: given.positions.map((x, i) => x - moved[i % 3]) } : given;
@@ -143,7 +143,7 @@ export interface ShareCell {
 /** The splats of a scene, distributed to cells. */
 export class ShareCells {
   readonly #layout: ShareLayout;
-  readonly #shares: PackedShare[] = [];
+  readonly #shares: PackedShard[] = [];
   /** Number of splats over all shards. */
   #count = 0;
   /** Sums of noise, and counts of splats, for each block. */
@@ -155,7 +155,7 @@ export class ShareCells {
   }
 
   /** Adds the next shard, in the order of the file: splats with equal codes keep that order. */
-  add(share: PackedShare): void {
+  add(share: PackedShard): void {
     this.#shares.push(share);
     const stride = wordsOf(this.#layout);
     const floats = new Float32Array(share.words.buffer);
@@ -242,7 +242,7 @@ export class ShareCells {
 
 /** Splats of a shard. */
 interface Range {
-  readonly share: PackedShare;
+  readonly share: PackedShard;
   readonly first: number;
   readonly end: number;
 }
@@ -318,7 +318,7 @@ export class JoinedBlocks {
    * @param count splats of all blocks
    * @param send gets each block as it comes; without it their words are joined
    */
-  constructor(layout: ShareLayout, count: number, facts: ShareFacts, send?: (block: SortedBlock) => void) {
+  constructor(layout: ShareLayout, count: number, facts: ShardInfo, send?: (block: SortedBlock) => void) {
     const { shDegree, shPrecision, moved } = layout;
     const origin = facts.origin.map((x, axis) => x + moved[axis]) as unknown as Vector3;
     this.head = { count, shDegree, shPrecision, ...facts, origin };

@@ -96,8 +96,8 @@ export class SortStage {
   }
 
   /** @param most Maximum number of keys: blocks beyond the actual number end at once. */
-  record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], most: number): void {
-    const blocks = Math.ceil(most / constants.SORT_BLOCK);
+  record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], max: number): void {
+    const blocks = Math.ceil(max / constants.SORT_BLOCK);
     for (const { count, scan, scatter } of bindings) {
       this.#count.dispatch(pass, count, blocks);
       this.#scan.dispatch(pass, scan, this.#scanGroups);

@@ -15,9 +15,9 @@ const STRETCH_MS = 50;
 /** After this time without a camera, ms, earlier samples are discarded. */
 const PAUSE_MS = 250;
 /** Maximum ratio of the speeds of two consecutive intervals. */
-const MOST_GROWTH = 2;
+const MAX_GROWTH = 2;
 /** Maximum predicted rotation in radians. */
-const MOST_TURN = 1;
+const MAX_TURN = 1;
 /** Tolerance of the row lengths of a matrix that counts as rotation and translation. */
 const SKEW = 1e-3;
 
@@ -25,13 +25,13 @@ const SKEW = 1e-3;
  * Milliseconds to request, read back and fetch a page and its parent, which must be resident first; and the maximum
  * prediction time.
  */
-const [LOOK_MS, MOST_AHEAD_MS] = [250, 600];
+const [LOOK_MS, MAX_AHEAD_MS] = [250, 600];
 
 /**
  * Prediction time of a camera for page requests, in milliseconds. @param arrivalMs Milliseconds that a page takes to
  * arrive.
  */
-export const aheadMs = (arrivalMs: number): number => Math.min(MOST_AHEAD_MS, LOOK_MS + arrivalMs);
+export const aheadMs = (arrivalMs: number): number => Math.min(MAX_AHEAD_MS, LOOK_MS + arrivalMs);
 
 interface Sample {
   readonly camera: Camera;
@@ -75,7 +75,7 @@ export class CameraMotion {
   ahead(milliseconds: number): Camera {
     const { camera, eye } = this.#samples.at(-1)!;
     const { moves, turns } = this.#velocity();
-    const angle = Math.min(MOST_TURN, milliseconds * length(turns));
+    const angle = Math.min(MAX_TURN, milliseconds * length(turns));
     if (length(moves) === 0 && angle === 0) return camera;
     const place = eye.map((x, axis) => x + milliseconds * moves[axis]) as unknown as Vector3;
     return { ...camera, worldToCamera: turned(camera.worldToCamera, turns, angle, place) };
@@ -93,12 +93,12 @@ export class CameraMotion {
 }
 
 /**
- * Damps a velocity by the previous one: zero if they oppose each other, else at most {@link MOST_GROWTH} times the
+ * Damps a velocity by the previous one: zero if they oppose each other, else at most {@link MAX_GROWTH} times the
  * previous one.
  */
 function lasting(before: Vector3, now: Vector3): Vector3 {
   if (dot(before, now) <= 0) return STILL;
-  return scale(now, Math.min(1, (MOST_GROWTH * length(before)) / length(now)));
+  return scale(now, Math.min(1, (MAX_GROWTH * length(before)) / length(now)));
 }
 
 function between(from: Sample, to: Sample): Velocity {

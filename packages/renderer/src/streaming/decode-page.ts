@@ -12,7 +12,7 @@ import {
   FILE_FLOATS,
   compactBits,
   headBytes,
-  mostBytes,
+  maxBytes,
   MIDDLE,
   PLANES,
   planesOf,
@@ -31,20 +31,20 @@ const ALL_CODES = 2 ** 48;
  * @throws GaussianSplatError `decode/corrupt`, or `decode/truncated`, for malformed bytes.
  */
 export async function decodePage(where: string, bytes: Uint8Array<ArrayBuffer>, file: CodedFile): Promise<ArrayBuffer> {
-  const inflated = await inflate(where, bytes, mostBytes(file));
+  const inflated = await inflate(where, bytes, maxBytes(file));
   return new PageDecoder(where, inflated, file).decode();
 }
 
 /** Inflates at most this many bytes, regardless of the size that a file declares. */
-async function inflate(where: string, bytes: Uint8Array<ArrayBuffer>, most: number): Promise<Uint8Array> {
-  const whole = new Uint8Array(most);
+async function inflate(where: string, bytes: Uint8Array<ArrayBuffer>, max: number): Promise<Uint8Array> {
+  const whole = new Uint8Array(max);
   let length = 0;
   const reader = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate-raw')).getReader();
   try {
     for (;;) {
       const { done, value } = await reader.read();
       if (done) return whole.subarray(0, length);
-      if (length + value.length > most) throw corrupt(where, `at most ${most} bytes, decompressed`, 'more');
+      if (length + value.length > max) throw corrupt(where, `at most ${max} bytes, decompressed`, 'more');
       whole.set(value, length);
       length += value.length;
     }
@@ -169,7 +169,7 @@ class PageDecoder {
     const onLine = Int32Array.from({ length: 256 }, (_, k) => Math.round((2 * QUANTIZED_T_ZERO * k) / last));
     const inSquare = Int32Array.from({ length: 256 }, (_, k) => Math.round((2 * QUANTIZED_UV_ZERO * k) / last));
     const codes = new Int32Array(ROW_CODES);
-    const most = new Int32Array(3);
+    const max = new Int32Array(3);
     for (let c = 0, i = 0; c < chunks; c++) {
       const at = QUANTIZED_CHUNK_WORDS * c;
       for (let axis = 0; axis < 3; axis++) {
@@ -178,7 +178,7 @@ class PageDecoder {
       }
       heads[at + 3] = this.#floats[CHUNK_FLOATS * chunks + 5];
       heads[at + 7] = coding.size / SIZE_CODES;
-      most.fill(0);
+      max.fill(0);
       let code = 0;
       let row = at + 4 * QUANTIZED_HEAD_ROWS;
       for (const end = i + this.#counts[c] + 1; i < end; i++, row += 4) {
@@ -188,7 +188,7 @@ class PageDecoder {
         const [fine, coarse] = [code % HALF_CODE, Math.floor(code / HALF_CODE)];
         for (let axis = 0; axis < 3; axis++) {
           codes[axis] = compactBits(fine << axis) | (compactBits(coarse << axis) << 8);
-          if (codes[axis] > most[axis]) most[axis] = codes[axis];
+          if (codes[axis] > max[axis]) max[axis] = codes[axis];
         }
         codes[3] = SIZE_CODES * sx[i];
         codes[4] = SIZE_CODES * sy[i];
@@ -202,7 +202,7 @@ class PageDecoder {
       const box = CHUNK_NUMBERS * c;
       for (let axis = 0; axis < 3; axis++) {
         bounds[box + axis] = heads[at + axis];
-        bounds[box + 4 + axis] = heads[at + axis] + heads[at + 4 + axis] * most[axis];
+        bounds[box + 4 + axis] = heads[at + axis] + heads[at + 4 + axis] * max[axis];
       }
       bounds[box + 3] = this.#of(c, 4);
     }

@@ -1,5 +1,5 @@
 /** Maximum number of views that are tracked; the most recently drawn ones are kept. */
-export const MOST_VIEWS = 4;
+export const MAX_VIEWS = 4;
 
 interface ViewSample {
   /** Version of the scene at the feedback pass. */
@@ -35,7 +35,7 @@ export class FeedbackViews {
     this.#looks.delete(view);
     this.#looks.set(view, { version, isStill, drawnAt: this.#frames });
     const [oldest] = this.#looks.keys();
-    if (this.#looks.size > MOST_VIEWS) this.#looks.delete(oldest);
+    if (this.#looks.size > MAX_VIEWS) this.#looks.delete(oldest);
     this.#sampledAt = [this.#frames, this.#sampledAt[0]];
   }
 

@@ -4,7 +4,7 @@ import { NONE, type InstanceList } from './page-list.js';
  * Selects the pages that show a scene best within a number of chunks, parents first: level by level from the roots,
  * until the next page does not fit. A page replaces the chunks of its parent. The roots are always included.
  */
-export function finestPages(list: InstanceList, mostChunks: number): number[] {
+export function finestPages(list: InstanceList, maxChunks: number): number[] {
   const { count, parent, parentChunks } = list;
   const depths = new Uint32Array(count);
   for (let page = 0; page < count; page++) if (parent[page] !== NONE) depths[page] = depths[parent[page]] + 1;
@@ -14,12 +14,12 @@ export function finestPages(list: InstanceList, mostChunks: number): number[] {
   let chunks = 0;
   for (const key of order) {
     // A page that adds nothing still costs time.
-    if (chosen.size > 2 * mostChunks) break;
+    if (chosen.size > 2 * maxChunks) break;
     const page = key % 2 ** 32;
     const isRoot = parent[page] === NONE;
     if (!isRoot && !chosen.has(parent[page])) continue;
     const more = list.place(page).chunks - (isRoot ? 0 : parentChunks[page]);
-    if (!isRoot && chunks + more > mostChunks) continue;
+    if (!isRoot && chunks + more > maxChunks) continue;
     chosen.add(page);
     chunks += more;
   }

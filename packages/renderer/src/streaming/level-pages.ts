@@ -1,7 +1,7 @@
 import { boundsOf, validateCloud, type Bounds, type GaussianCloud } from '@gaussian-splat/core';
 import { usableIndices, type PackOptions } from '../pack/pack.js';
 import { mortonOrder } from '../pack/morton.js';
-import { recentred } from '../pack/recentre.js';
+import { recentered } from '../pack/recenter.js';
 import { choosePrecision, noiseIn } from '../pack/sh.js';
 import type { StreamedScene } from './page-source.js';
 import { joinSlots, packRun, type PackedRun } from './pack-run.js';
@@ -56,13 +56,13 @@ export interface LevelScene {
  * @param boxes Each with at least one level.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
-export function layOutLevels(
+export function layoutLevels(
   coarsest: GaussianCloud,
   boxes: readonly LevelBox[],
   options: Pick<PackOptions, 'sh'> = {},
 ): LevelScene {
   validateCloud(coarsest);
-  const cloud = recentred(coarsest);
+  const cloud = recentered(coarsest);
   const usable = usableIndices(cloud);
   const { sh = 'auto' } = options;
   const { shDegree, antialiased, filterVariance, origin, hints } = cloud;
@@ -139,7 +139,7 @@ function errorsOf(counts: readonly number[], measured: number, radius: number): 
 type Corners = Pick<LevelBox, 'min' | 'max'>;
 
 /** Factor that enlarges the radius by more than the rounding error of float32. */
-const SPARE = 1.00001;
+const RADIUS_MARGIN = 1.00001;
 
 /** Center and radius of a sphere around the boxes of chunks, and around the declared box of all levels. */
 function sphereAround(chunks: Float32Array, box?: Corners): number[] {
@@ -153,5 +153,5 @@ function sphereAround(chunks: Float32Array, box?: Corners): number[] {
   }
   const center = low.map((x, axis) => Math.fround((x + high[axis]) / 2));
   const radius = Math.hypot(...center.map((x, axis) => Math.max(high[axis] - x, x - low[axis])));
-  return [...center, Math.fround(SPARE * radius)];
+  return [...center, Math.fround(RADIUS_MARGIN * radius)];
 }

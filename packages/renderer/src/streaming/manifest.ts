@@ -1,7 +1,7 @@
 import { GaussianSplatError, type Bounds, type ErrorCode, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS } from '../levels/chunk-detail.js';
-import { CLASSES, CLASS_STEP, LEAST_OPACITY_STEP, type PageCoding } from './page-coding.js';
+import { CLASSES, CLASS_STEP, MIN_OPACITY_STEP, type PageCoding } from './page-coding.js';
 import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 import { CHUNK_NUMBERS, GEOMETRY_WORDS, type ShPrecision, shWords } from '../pack/words.js';
 
@@ -13,7 +13,7 @@ const FILE_CHUNKS = 20;
  * Maximum number of pages over all instances, for 4.3 billion splats. Each takes about 90 bytes of CPU memory before
  * any is loaded, and shaders index them with 24 bits.
  */
-export const MOST_PAGES = 1 << 22;
+export const MAX_PAGES = 1 << 22;
 
 /**
  * A file of a tree: a page of chunks with one parent, followed by the child pages of each of these chunks, all full but
@@ -102,11 +102,11 @@ function shown(value: unknown): string {
 
 /**
  * Validates a parsed manifest.
- * @param mostPages Maximum number of pages that the load may hold in memory.
+ * @param maxPages Maximum number of pages that the load may hold in memory.
  * @throws GaussianSplatError `out-of-memory/budget` for more, `decode/unsupported` for another format or version,
  * `decode/header` for other faults.
  */
-export function checkManifest(value: unknown, where: string, mostPages = MOST_PAGES): DetailManifest {
+export function checkManifest(value: unknown, where: string, maxPages = MAX_PAGES): DetailManifest {
   const manifest = (typeof value === 'object' && value !== null ? value : {}) as Partial<DetailManifest>;
   const fail = (path: string, expected: string, found: unknown, code: ErrorCode = 'decode/header'): never => {
     throw new GaussianSplatError(code, {
@@ -151,15 +151,15 @@ export function checkManifest(value: unknown, where: string, mostPages = MOST_PA
       (i === 0 || isPlace(instance.parent, trees![instances![0].tree].pages));
     if (!isFine) fail(`instances[${i}]`, 'a tree, where it stands, and the chunk above it', instance);
   });
-  checkPages(manifest as DetailManifest, fail, Math.min(MOST_PAGES, mostPages));
+  checkPages(manifest as DetailManifest, fail, Math.min(MAX_PAGES, maxPages));
   return manifest as DetailManifest;
 }
 
 /** Lower and upper limits of the values of a coding; color steps may have any size. */
-const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [least: number, most: number]>> = {
+const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [min: number, max: number]>> = {
   size: [1 / 48, 1],
   directions: [3, 255],
-  opacity: [LEAST_OPACITY_STEP, 512],
+  opacity: [MIN_OPACITY_STEP, 512],
   color: [0, 1e6],
   chroma: [0, 1e6],
   scale: [0, 255 - CLASS_STEP * (CLASSES - 1)],
@@ -168,16 +168,16 @@ const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [least: number, 
 function checkCoding({ version, coding, shPrecision }: Partial<DetailManifest>, fail: Fail): void {
   if (version !== 4) return void (coding === undefined || fail('coding', 'nothing before version 4', coding));
   if (shPrecision !== 'int8') fail('shPrecision', 'int8 where files are coded', shPrecision);
-  for (const [key, [least, most]] of Object.entries(CODING_RANGES)) {
+  for (const [key, [min, max]] of Object.entries(CODING_RANGES)) {
     const value = coding?.[key as keyof PageCoding];
-    const isFine = typeof value === 'number' && value >= least && value <= most;
+    const isFine = typeof value === 'number' && value >= min && value <= max;
     const isWhole = ['directions', 'opacity', 'scale'].includes(key);
-    if (!isFine || (isWhole && !Number.isInteger(value))) fail(`coding.${key}`, `${least} to ${most}`, value);
+    if (!isFine || (isWhole && !Number.isInteger(value))) fail(`coding.${key}`, `${min} to ${max}`, value);
   }
 }
 
 /** Checks the consistency of files and instances that are valid on their own. */
-function checkPages({ trees, instances }: DetailManifest, fail: Fail, mostPages: number): void {
+function checkPages({ trees, instances }: DetailManifest, fail: Fail, maxPages: number): void {
   const lengths = new Map<string, number>();
   const taken = trees.map((tree, t) => {
     const places = new Places(tree);
@@ -195,9 +195,9 @@ function checkPages({ trees, instances }: DetailManifest, fail: Fail, mostPages:
   });
   const counts = trees.map(({ pages }) => pages.reduce((sum, file) => sum + pagesIn(file), 0));
   const count = instances.reduce((sum, { tree }) => sum + counts[tree], 0);
-  if (count > MOST_PAGES) fail('instances', `at most ${MOST_PAGES} pages`, count);
-  if (count > mostPages)
-    fail('instances', `at most ${mostPages} pages in a file of this size`, count, 'out-of-memory/budget');
+  if (count > MAX_PAGES) fail('instances', `at most ${MAX_PAGES} pages`, count);
+  if (count > maxPages)
+    fail('instances', `at most ${maxPages} pages in a file of this size`, count, 'out-of-memory/budget');
 }
 
 /** Number of pages in a file. */

@@ -1,7 +1,7 @@
 import { validateCloud, type GaussianCloud, type LevelRun } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { packKept, usableIndices, type PackedGaussians, type PackOptions } from '../pack/pack.js';
-import { recentred } from '../pack/recentre.js';
+import { recentered } from '../pack/recenter.js';
 import { mortonOrder } from '../pack/morton.js';
 import { choosePrecision, noiseIn } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from '../levels/chunk-detail.js';
@@ -26,7 +26,7 @@ interface PackedRun extends LevelRun {
  */
 export function packLevelRuns(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(given);
-  const cloud = recentred(given);
+  const cloud = recentered(given);
   const usable = usableIndices(cloud);
   const { sh = 'auto' } = options;
   const droppedCount = cloud.droppedCount + cloud.count - usable.length;

@@ -32,11 +32,11 @@ export function cloudOfChunks(
   parts: readonly PageChunks[],
 ): GaussianCloud {
   const { shDegree, shPrecision, antialiased, filterVariance, origin } = scene;
-  const most = CULL_GROUP * parts.reduce((sum, { chunks }) => sum + chunks.length, 0);
+  const max = CULL_GROUP * parts.reduce((sum, { chunks }) => sum + chunks.length, 0);
   const numbers = 3 * shCoefficientCount(shDegree);
-  const [positions, scales] = [new Float32Array(3 * most), new Float32Array(3 * most)];
-  const [rotations, opacities] = [new Float32Array(4 * most), new Float32Array(most)];
-  const sh = new Float32Array(numbers * most);
+  const [positions, scales] = [new Float32Array(3 * max), new Float32Array(3 * max)];
+  const [rotations, opacities] = [new Float32Array(4 * max), new Float32Array(max)];
+  const sh = new Float32Array(numbers * max);
   let count = 0;
   const codes = new Int32Array(ROW_CODES);
   for (const { words, of, chunks, translate = [0, 0, 0] } of parts) {
@@ -64,7 +64,7 @@ export function cloudOfChunks(
       }
     }
   }
-  const cut = (values: Float32Array): Float32Array => values.subarray(0, (values.length / most) * count);
+  const cut = (values: Float32Array): Float32Array => values.subarray(0, (values.length / max) * count);
   return {
     ...{ count, origin, antialiased, filterVariance, shDegree, droppedCount: 0, positions: cut(positions) },
     ...{ scales: cut(scales), rotations: cut(rotations), opacities: cut(opacities), sh: cut(sh) },

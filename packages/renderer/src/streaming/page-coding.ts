@@ -34,7 +34,7 @@ export interface CodedFile {
 /** Steps of the GPU's words in one of {@link PageCoding.size}: the largest of 1023 must be a size that shaders accept. */
 export const SIZE_CODES = 4;
 /** Minimum of these steps, so that an opacity above 1 fits one byte. */
-export const LEAST_OPACITY_STEP = 16;
+export const MIN_OPACITY_STEP = 16;
 /** Color differences above the constant one are even, so half of them is an integer. */
 export const CHROMA_CODES = 2;
 
@@ -69,7 +69,7 @@ export const headBytes = ({ chunks, shDegree }: Pick<CodedFile, 'chunks' | 'shDe
   chunks + 4 * (CHUNK_FLOATS * chunks + FILE_FLOATS) + planesOf(shDegree);
 
 /** Maximum number of bytes in a decompressed file. */
-export const mostBytes = (file: Pick<CodedFile, 'chunks' | 'shDegree'>): number =>
+export const maxBytes = (file: Pick<CodedFile, 'chunks' | 'shDegree'>): number =>
   headBytes(file) + constants.CULL_GROUP * file.chunks * planesOf(file.shDegree);
 
 /** Coding of a plane: its bytes, or the differences from the previous byte. */

@@ -3,7 +3,7 @@ import { NONE, type PageList } from './page-list.js';
 
 export const ARRIVAL_MS = 400;
 /** Minimum number of frames over which a page fades in. */
-export const LEAST_STEPS = 16;
+export const MIN_STEPS = 16;
 
 /** Fades in pages over their parents; no page before its parent. */
 export class PageFadeIn {
@@ -17,7 +17,7 @@ export class PageFadeIn {
   #steppedAt = 0;
 
   /**
-   * @param milliseconds Duration of a fade, over at least {@link LEAST_STEPS} frames; 0 for none.
+   * @param milliseconds Duration of a fade, over at least {@link MIN_STEPS} frames; 0 for none.
    * @param setArrived Is called with a page and its progress: 0 to `ARRIVED`.
    */
   constructor(list: PageList, milliseconds: number, setArrived: (page: number, arrived: number) => void) {
@@ -53,7 +53,7 @@ export class PageFadeIn {
     const elapsed = (now - this.#steppedAt) / this.#milliseconds;
     this.#steppedAt = now;
     if (this.#arriving.size === 0) return false;
-    const step = Math.min(1 / LEAST_STEPS, elapsed);
+    const step = Math.min(1 / MIN_STEPS, elapsed);
     const [passed, { parent }] = [this.#passed, this.#list];
     for (const page of this.#arriving) {
       const next = Math.min(passed[parent[page]], passed[page] + step);

@@ -4,7 +4,7 @@ import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { cameraValues } from '../view.js';
 import { CameraMotion } from './camera-motion.js';
-import { MOST_VIEWS, FeedbackViews } from './feedback-views.js';
+import { MAX_VIEWS, FeedbackViews } from './feedback-views.js';
 import { constants } from '../generated/shaders.js';
 import { pageFeedback } from '../generated/streamed-shaders.js';
 import { Stage } from '../stages/stage.js';
@@ -100,7 +100,7 @@ export class PageFeedback implements PageRequests {
     this.#unseen.delete(view);
     if (!isSeen) this.#unseen.add(view);
     const [oldest] = this.#unseen;
-    if (this.#unseen.size > MOST_VIEWS) this.#unseen.delete(oldest);
+    if (this.#unseen.size > MAX_VIEWS) this.#unseen.delete(oldest);
     clearTimeout(this.#timer);
     if (this.#unseen.size > 0) this.#timer = setTimeout(() => this.#sample(), STALE_MS);
   }

@@ -68,12 +68,12 @@ export function childrenIn(list: PageList, page: number, slot: number): Uint32Ar
 }
 
 /** [P] 1 for pages that need more slots, including all their ancestors, than this limit. */
-export function largerThan(most: number, { count, slots, parent }: PageList): Uint8Array {
+export function largerThan(max: number, { count, slots, parent }: PageList): Uint8Array {
   const withAbove = new Float64Array(count);
   for (let page = 0; page < count; page++) {
     withAbove[page] = slots[page] + (parent[page] === NONE ? 0 : withAbove[parent[page]]);
   }
-  return Uint8Array.from(withAbove, (needed) => (needed > most ? 1 : 0));
+  return Uint8Array.from(withAbove, (needed) => (needed > max ? 1 : 0));
 }
 
 /** A page of a tree, and its parent page and chunk. */

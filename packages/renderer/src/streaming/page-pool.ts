@@ -1,5 +1,5 @@
 import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage } from '../gaussian-scene.js';
+import type { GaussianBlock } from '../gaussian-scene.js';
 import { pageCapacity } from '../gaussian-buffers.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
@@ -20,7 +20,7 @@ const LARGEST_BUFFER = 1 << 27;
  * Fraction of the pool's memory for staging uploads, and its upper limit in bytes: with that many, one frame in a
  * hundred lacked staging memory at the maximum upload rate.
  */
-const STAGING = { share: 1 / 32, most: 24e6 } as const;
+const STAGING = { share: 1 / 32, max: 24e6 } as const;
 
 /** Bytes of GPU memory that one slot takes. */
 export function slotBytes(format: PageFormat): number {
@@ -45,7 +45,7 @@ export const poolBytes = (format: PageFormat, { slots, blocks }: PoolSize): numb
 export function poolSize(format: PageFormat, list: PageList, budget: number): PoolSize {
   const all = list.slots.reduce((sum, slots) => sum + slots, 0);
   const bytes = Math.min(budget, all * slotBytes(format));
-  const blocks = Math.floor(Math.min(STAGING.most, STAGING.share * bytes) / BLOCK_BYTES);
+  const blocks = Math.floor(Math.min(STAGING.max, STAGING.share * bytes) / BLOCK_BYTES);
   const slots = Math.min(all, Math.floor((budget - blocks * BLOCK_BYTES) / slotBytes(format)));
   if (slots >= list.slots[0]) return { slots, blocks };
   throw new GaussianSplatError('out-of-memory/budget', {
@@ -61,7 +61,7 @@ export function poolSize(format: PageFormat, list: PageList, budget: number): Po
  * without a page is never drawn.
  */
 export class PagePool {
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly #device: GPUDevice;
   readonly #layout: ChunkLayout;
   /** Boxes of the chunks of the slot that is being written. */
@@ -147,7 +147,7 @@ export class PagePool {
     this.#device.queue.writeBuffer(to, at + 4 * taken, words, taken);
   }
 
-  #find(slot: number): { page: GaussianPage; place: number } {
+  #find(slot: number): { page: GaussianBlock; place: number } {
     return { page: this.pages[Math.floor(slot / this.slotsPerBuffer)], place: slot % this.slotsPerBuffer };
   }
 }

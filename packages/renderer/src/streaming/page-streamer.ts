@@ -3,12 +3,12 @@ import { NONE } from './page-list.js';
 import type { Residency } from './residency.js';
 
 /** Maximum number of concurrent fetches; a file holds up to five pages. */
-export const MOST_FETCHES = 64;
+export const MAX_FETCHES = 64;
 /**
  * Upper limit of the slots of pages in transit or waiting for their upload: at most 31 MB of CPU memory, plus one page
  * of any size; more if they share files with others.
  */
-export const MOST_UNDER_WAY = 240;
+export const MAX_IN_FLIGHT = 240;
 /** Weight of the previous mean arrival time when a new page arrives. */
 const MEMORY = 0.95;
 /**
@@ -16,7 +16,7 @@ const MEMORY = 0.95;
  * attempts.
  */
 const RETRY_MS = 4_000;
-const MOST_TRIES = 8;
+const MAX_TRIES = 8;
 /** Milliseconds after a failure before pages that did not fit beside it are tried again, once for many failures. */
 const RECHECK_MS = 250;
 
@@ -49,7 +49,7 @@ export class PageStreamer<Words> {
   #order: number[] | undefined;
   readonly #failures: BackOff<number>;
   #retry: ReturnType<typeof setTimeout> | undefined;
-  #anew: ReturnType<typeof setTimeout> | undefined;
+  #recheckTimer: ReturnType<typeof setTimeout> | undefined;
   readonly #sentAt = new Map<number, number>();
   readonly #now: () => number;
   #arrivalMs = 0;
@@ -61,7 +61,7 @@ export class PageStreamer<Words> {
     this.#residency = residency;
     this.#options = options;
     this.#now = options.now ?? (() => performance.now());
-    this.#failures = new BackOff({ firstMs: RETRY_MS, factor: 2, mostTries: MOST_TRIES, now: options.now });
+    this.#failures = new BackOff({ firstMs: RETRY_MS, factor: 2, maxTries: MAX_TRIES, now: options.now });
   }
 
   /** Number of pages being fetched or waiting. */
@@ -98,7 +98,7 @@ export class PageStreamer<Words> {
 
   /** Fetches the most needed pages, up to the limits. */
   sendForMore(): void {
-    while (!this.#isClosed && this.#fetching.size < MOST_FETCHES && this.#slotsUnderWay < MOST_UNDER_WAY) {
+    while (!this.#isClosed && this.#fetching.size < MAX_FETCHES && this.#slotsUnderWay < MAX_IN_FLIGHT) {
       const page = this.#residency.nextMissing();
       if (page === NONE) return;
       if (!this.#failures.isPaused(page) && this.#residency.begin(page)) void this.#bring(page);
@@ -107,13 +107,13 @@ export class PageStreamer<Words> {
 
   /** Returns the most needed of the waiting pages; undefined if none is requested. */
   next(): FetchedPage<Words> | undefined {
-    const most = this.#nextWaiting();
-    if (most === undefined) return undefined;
-    const words = this.#waiting.get(most)!;
-    this.#waiting.delete(most);
-    this.#slotsUnderWay -= this.#residency.slotsFor(most);
-    this.#noteArrival(most);
-    return { page: most, words };
+    const max = this.#nextWaiting();
+    if (max === undefined) return undefined;
+    const words = this.#waiting.get(max)!;
+    this.#waiting.delete(max);
+    this.#slotsUnderWay -= this.#residency.slotsFor(max);
+    this.#noteArrival(max);
+    return { page: max, words };
   }
 
   /** Call if the returned page found no slot. */
@@ -125,7 +125,7 @@ export class PageStreamer<Words> {
   close(): void {
     this.#isClosed = true;
     clearTimeout(this.#retry);
-    clearTimeout(this.#anew);
+    clearTimeout(this.#recheckTimer);
     for (const controller of this.#fetching.values()) controller.abort();
     this.#fetching.clear();
     this.#waiting.clear();
@@ -141,8 +141,8 @@ export class PageStreamer<Words> {
     if (this.#failures.fail(page) === 1) this.#options.onError(error);
     this.#retryLater();
     // The reserved slots are available to other pages.
-    this.#anew ??= setTimeout(() => {
-      this.#anew = undefined;
+    this.#recheckTimer ??= setTimeout(() => {
+      this.#recheckTimer = undefined;
       this.#recheck();
     }, RECHECK_MS);
   }

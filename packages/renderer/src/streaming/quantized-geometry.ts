@@ -26,11 +26,11 @@ export const QUANTIZED_CHUNK_WORDS = 4 * QUANTIZED_CHUNK_ROWS;
 const CENTER_STEPS = 65535;
 /** Twice the maximum rounding error of a center, as a fraction of the diagonal of its chunk's box. */
 export const CENTER_ROUNDING = 1 / CENTER_STEPS;
-const MOST_OPACITY = 4095;
+const MAX_OPACITY = 4095;
 /** The lowest visible opacity code. */
 const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);
 /** Octaves below the largest row of a chunk: anything smaller is invisible beside it. */
-const MOST_OCTAVES = 24;
+const MAX_OCTAVES = 24;
 
 /** Factor of the reach for the rounding of sizes, and of opacities that are barely visible. */
 const FARTHER = 1.02;
@@ -47,8 +47,8 @@ function roundedUp(value: number): number {
 }
 
 /** The nearest code, 0 for values below `least`. */
-const codeOf = (value: number, least: number, step: number, most: number): number =>
-  step > 0 ? Math.min(most, Math.max(0, Math.round((value - least) / step))) : 0;
+const codeOf = (value: number, min: number, step: number, max: number): number =>
+  step > 0 ? Math.min(max, Math.max(0, Math.round((value - min) / step))) : 0;
 
 /** Lengths of the rows of a factor (xx, yx, yy, zx, zy, zz) from number `f` on. */
 export function rowLengths(factors: Float32Array, f: number, lengths: Float64Array): void {
@@ -57,17 +57,17 @@ export function rowLengths(factors: Float32Array, f: number, lengths: Float64Arr
   lengths[2] = Math.hypot(factors[f + 3], factors[f + 4], factors[f + 5]);
 }
 
-/** log2 of the smallest and of the largest row of some splats, at most {@link MOST_OCTAVES} apart. */
-function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly [least: number, largest: number] {
+/** log2 of the smallest and of the largest row of some splats, at most {@link MAX_OCTAVES} apart. */
+function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly [min: number, largest: number] {
   const lengths = new Float64Array(3);
-  let [least, largest] = [Infinity, 0];
+  let [min, largest] = [Infinity, 0];
   for (let i = from; i < end; i++) {
     rowLengths(factors, FACTOR_NUMBERS * i, lengths);
-    least = Math.min(least, lengths[0], lengths[1], lengths[2]);
+    min = Math.min(min, lengths[0], lengths[1], lengths[2]);
     largest = Math.max(largest, lengths[0], lengths[1], lengths[2]);
   }
   const high = largest > 0 ? Math.log2(largest) : 0;
-  return [Math.max(high - MOST_OCTAVES, Math.min(high, Math.log2(least))), high];
+  return [Math.max(high - MAX_OCTAVES, Math.min(high, Math.log2(min))), high];
 }
 
 /**
@@ -87,13 +87,13 @@ export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: nu
     floats[at + axis] = low;
     floats[at + 4 + axis] = roundedUp((high - low) / CENTER_STEPS);
   }
-  const [least, largest] = octavesOf(level, from, end);
-  floats[at + 3] = least;
+  const [min, largest] = octavesOf(level, from, end);
+  floats[at + 3] = min;
   floats[at + 7] = roundedUp((largest - floats[at + 3]) / QUANTIZED_SIZES);
   const lengths = new Float64Array(3);
   const codes = new Int32Array(ROW_CODES);
-  const code = (k: number, value: number, most: number): number =>
-    codeOf(value, floats[at + k], floats[at + 4 + k], most);
+  const code = (k: number, value: number, max: number): number =>
+    codeOf(value, floats[at + k], floats[at + 4 + k], max);
   for (let i = from; i < end; i++) {
     const [x, y, z] = [0, 1, 2].map((axis) => code(axis, positions[3 * i + axis], CENTER_STEPS));
     const f = FACTOR_NUMBERS * i;
@@ -140,7 +140,7 @@ export function widenReach(bounds: Float32Array, at: number): void {
 
 /** On the same side of 1/255 as the opacity, because splats below it are not drawn. */
 function opacityCode(opacity: number): number {
-  const nearest = Math.min(MOST_OPACITY, Math.max(0, Math.round(opacity * QUANTIZED_OPAQUE)));
+  const nearest = Math.min(MAX_OPACITY, Math.max(0, Math.round(opacity * QUANTIZED_OPAQUE)));
   return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
 }
 

@@ -1,6 +1,6 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { layouts } from '../generated/shaders.js';
-import type { GaussianPage } from '../gaussian-scene.js';
+import type { GaussianBlock } from '../gaussian-scene.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { moveQuantizedSlots } from '../generated/quantized-shaders.js';
@@ -8,7 +8,7 @@ import { moveSlots } from '../generated/streamed-shaders.js';
 import { Stage } from '../stages/stage.js';
 
 /** Slots translated in one submission. */
-const MOST_MOVES = 256;
+const MAX_MOVES = 256;
 const MOVE_WORDS = layouts.SlotMove.size / 4;
 const { by: BY, slot: SLOT } = layouts.SlotMove.fields;
 
@@ -23,7 +23,7 @@ export class SlotMover {
   constructor(
     device: GPUDevice,
     memory: GpuMemory,
-    pages: readonly GaussianPage[],
+    pages: readonly GaussianBlock[],
     { slotsPerBuffer, geometry }: { readonly slotsPerBuffer: number; readonly geometry?: 'quantized' },
   ) {
     this.#device = device;
@@ -31,7 +31,7 @@ export class SlotMover {
     this.#slotsPerBuffer = slotsPerBuffer;
     const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination;
     this.#pages = pages.map(({ geometry }) => {
-      const moves = memory.buffer('gs.pool.moves', 4 * MOVE_WORDS * MOST_MOVES, usage);
+      const moves = memory.buffer('gs.pool.moves', 4 * MOVE_WORDS * MAX_MOVES, usage);
       return { moves, bindings: this.#stage.bind({ moves, gaussians: geometry }) };
     });
   }
@@ -43,7 +43,7 @@ export class SlotMover {
 
   /** Whether {@link record} must be called before another slot. */
   get isFull(): boolean {
-    return this.#pending.size === MOST_MOVES;
+    return this.#pending.size === MAX_MOVES;
   }
 
   /** Discards the translation of a slot that is about to be overwritten. */

@@ -1,5 +1,5 @@
 import { GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
+import type { GaussianBlock, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
@@ -101,7 +101,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly order: 'pixel' | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
-  readonly pages: readonly GaussianPage[];
+  readonly pages: readonly GaussianBlock[];
   readonly detailBudget: DetailBudget;
   /** Page requests of the views, for the renderer. */
   readonly pageRequests: PageFeedback;
@@ -112,7 +112,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly #pool: PagePool;
   readonly #residency: Residency;
   readonly #traffic: PageStreamer<readonly SlotWords[]>;
-  readonly #pace = new UploadBudget();
+  readonly #uploadBudget = new UploadBudget();
   readonly #slotBytes: number;
   readonly #rows: TranslatedRows;
   readonly #arrivals: PageFadeIn;
@@ -264,7 +264,7 @@ export class StreamedGaussians implements GaussianScene {
   update(): void {
     const start = performance.now();
     if (this.#arrivals.step(start)) this.#version++;
-    this.#uploadSome(this.#pace.startFrame(start));
+    this.#uploadSome(this.#uploadBudget.startFrame(start));
     this.#finishWrites();
     this.#uploaded.milliseconds += performance.now() - start;
     this.#traffic.sendForMore();
@@ -285,10 +285,10 @@ export class StreamedGaussians implements GaussianScene {
   }
 
   /** Uploads the most needed waiting pages: one slot, and as many more as fit this number of bytes. */
-  #uploadSome(most: number): void {
+  #uploadSome(max: number): void {
     const start = performance.now();
     let bytes = 0;
-    while (bytes === 0 || bytes + this.#slotBytes <= most) {
+    while (bytes === 0 || bytes + this.#slotBytes <= max) {
       if (this.#upload === undefined) {
         const next = this.#traffic.next();
         if (next === undefined) break;
@@ -301,7 +301,7 @@ export class StreamedGaussians implements GaussianScene {
       }
       bytes += this.#writeSlot(this.#upload!);
     }
-    if (bytes > 0) this.#pace.note(bytes, performance.now() - start);
+    if (bytes > 0) this.#uploadBudget.note(bytes, performance.now() - start);
   }
 
   /**

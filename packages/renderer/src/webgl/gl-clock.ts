@@ -39,7 +39,7 @@ export class GlClock {
    * @param least Lower bound of the result in ms: some browsers wait for frames on the main thread, so little else is
    * known.
    */
-  async time(draw: () => void, least = 0): Promise<WorkTime> {
+  async time(draw: () => void, min = 0): Promise<WorkTime> {
     const begin = performance.now();
     draw();
     // If the browser draws synchronously, the thread was busy for the whole time.
@@ -48,8 +48,8 @@ export class GlClock {
     // Time of the previous frame, which may not have completed when this one was drawn.
     const before = this.#last;
     this.#last = observed;
-    const atMost = observed.now - Math.max(begin, before.since);
-    const atLeast = Math.min(atMost, Math.max(least, busy, observed.since - Math.max(begin, before.now)));
-    return { doneAt: observed.now, atLeast, atMost };
+    const upperBound = observed.now - Math.max(begin, before.since);
+    const lowerBound = Math.min(upperBound, Math.max(min, busy, observed.since - Math.max(begin, before.now)));
+    return { doneAt: observed.now, lowerBound, upperBound };
   }
 }

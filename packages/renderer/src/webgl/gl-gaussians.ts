@@ -111,11 +111,11 @@ async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content:
 function requireRoom(gl: WebGL2RenderingContext, { count, shDegree, geometry, sh }: PackedGaussians): void {
   const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
   const texels = Math.max(geometry.length / 4, sh.length / 2);
-  const most = side < DATA_WIDTH ? 0 : Math.floor((side * DATA_WIDTH * count) / texels);
-  if (!(count > most) || gl.isContextLost()) return;
+  const max = side < DATA_WIDTH ? 0 : Math.floor((side * DATA_WIDTH * count) / texels);
+  if (!(count > max) || gl.isContextLost()) return;
   throw new GaussianSplatError('out-of-memory/buffer-limit', {
     where: `scene of ${count} splats, drawn with WebGL 2`,
-    expected: `at most ${most} splats with harmonics of degree ${shDegree}: textures of this browser have ${side} rows at most`,
+    expected: `at most ${max} splats with harmonics of degree ${shDegree}: textures of this browser have ${side} rows at most`,
     found: String(count),
     remedy: 'show a smaller scene (gaussian-splat economise makes one), or use a browser with WebGPU',
   });

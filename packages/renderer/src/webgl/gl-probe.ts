@@ -6,10 +6,10 @@ import type { ProbeView } from './shaders.js';
 /** Runs for each point: one fragment each. */
 const RUNS = 1024;
 /** Maximum number of points in one pass. */
-const MOST_POINTS = 256;
+const MAX_POINTS = 256;
 const NUMBERS = 4;
 /** GLSL compilers may assume that there are no infinities. */
-const LARGEST_FLOAT32 = 3.4e38;
+const MAX_FLOAT32 = 3.4e38;
 
 export interface GlProbeSource {
   readonly gl: WebGL2RenderingContext;
@@ -33,9 +33,9 @@ const LEFT = [0.9, 0.5, 0.1] as const;
 
 /** Waits for the GPU, so that all passes see the same frame: call it for clicks and labels, not for every frame. */
 export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]): ProbeAnswer[] {
-  if (points.length > MOST_POINTS) {
-    const first = probeSplats(source, points.slice(0, MOST_POINTS));
-    return [...first, ...probeSplats(source, points.slice(MOST_POINTS))];
+  if (points.length > MAX_POINTS) {
+    const first = probeSplats(source, points.slice(0, MAX_POINTS));
+    return [...first, ...probeSplats(source, points.slice(MAX_POINTS))];
   }
   if (points.length === 0) return [];
   const { count } = source;
@@ -153,9 +153,9 @@ function lookAt(
   const target = makeTarget(gl, [texture]);
   try {
     gl.disable(gl.BLEND);
-    points.forEach(({ x, y, depth = LARGEST_FLOAT32 }, row) => {
+    points.forEach(({ x, y, depth = MAX_FLOAT32 }, row) => {
       const { first, end } = ranges[row];
-      const point = [x, y, Math.min(depth, LARGEST_FLOAT32)];
+      const point = [x, y, Math.min(depth, MAX_FLOAT32)];
       program.use({ point, first, end, run: runOf(first, end) }, textures);
       gl.viewport(0, row, RUNS, 1);
       // A triangle larger than the target, scissored to the row.

@@ -5,7 +5,7 @@ import { untilItHasRoom, readBack } from '@gaussian-splat/renderer/tools';
 import * as generated from '../generated/shaders.js';
 import { show } from './show.js';
 
-const { ERROR_TILE, pictureError, pictureErrorSum, PictureErrors: layout } = generated;
+const { ERROR_TILE, imageError: imageError, imageErrorSum: imageErrorSum, ImageErrors: layout } = generated;
 /** A sum of squares and a count of pixels. */
 const SUM_BYTES = 8;
 const COUNTS_BYTES = 16;
@@ -28,7 +28,7 @@ export interface Exhibit {
  * Errors of images of a scene against those of a reference scene in the same views. Images never leave the GPU: for
  * each a sum of squares and a number of pixels are read back, all in one read.
  */
-export class PictureErrors {
+export class ImageErrors {
   readonly #device: GPUDevice;
   readonly #viewpoint: Viewpoint;
   readonly #memory: GpuMemory;
@@ -53,11 +53,11 @@ export class PictureErrors {
     const tiles = buffer('tile_errors', SUM_BYTES * room * views.length, storage);
     this.#errors = buffer('errors', SUM_BYTES * views.length, storage | copySource);
     this.#counts = buffer('counts', COUNTS_BYTES * views.length, copySource | copyDestination);
-    const pictures = buffer('pictures', layout.size, uniform | copyDestination);
+    const images = buffer('images', layout.size, uniform | copyDestination);
     const bytes = new ArrayBuffer(layout.size);
     writeStruct(layout, { tiles: room }, bytes);
-    device.queue.writeBuffer(pictures, 0, bytes);
-    this.#sum = rareKernelOf(device, pictureErrorSum).bind({ pictures, tiles, errors: this.#errors });
+    device.queue.writeBuffer(images, 0, bytes);
+    this.#sum = rareKernelOf(device, imageErrorSum).bind({ images, tiles, errors: this.#errors });
     const size = SUM_BYTES * room;
     this.#exhibits = views.map((camera, k) => this.#exhibit(camera, { buffer: tiles, offset: size * k, size }));
   }
@@ -72,8 +72,8 @@ export class PictureErrors {
     gaussians: GaussianScene,
     views: readonly Camera[],
     pause?: Pause,
-  ): Promise<PictureErrors> {
-    const made = new PictureErrors(device, viewpoint, views);
+  ): Promise<ImageErrors> {
+    const made = new ImageErrors(device, viewpoint, views);
     try {
       const sums = new Float32Array(await made.#draw(gaussians, ({ reference }) => reference, pause));
       made.#covered = views.map((_, k) => sums[2 * k + 1]);
@@ -113,7 +113,7 @@ export class PictureErrors {
       ...{ camera, reference },
       columns: Math.ceil(camera.width / ERROR_TILE),
       rows: Math.ceil(camera.height / ERROR_TILE),
-      compare: rareKernelOf(this.#device, pictureError).bind({ image, reference: reference.createView(), tiles }),
+      compare: rareKernelOf(this.#device, imageError).bind({ image, reference: reference.createView(), tiles }),
     };
   }
 
@@ -165,7 +165,7 @@ export class PictureErrors {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.compare' });
     this.#viewpoint.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
     const pass = encoder.beginComputePass({ label: 'gs.economise.compare' });
-    rareKernelOf(this.#device, pictureError).dispatchGrid(pass, compare, columns, rows);
+    rareKernelOf(this.#device, imageError).dispatchGrid(pass, compare, columns, rows);
     pass.end();
     this.#device.queue.submit([encoder.finish()]);
   }
@@ -173,7 +173,7 @@ export class PictureErrors {
   #addUp(): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.add_up' });
     const pass = encoder.beginComputePass({ label: 'gs.economise.add_up' });
-    rareKernelOf(this.#device, pictureErrorSum).dispatchGrid(pass, this.#sum, this.#exhibits.length, 1);
+    rareKernelOf(this.#device, imageErrorSum).dispatchGrid(pass, this.#sum, this.#exhibits.length, 1);
     pass.end();
     this.#device.queue.submit([encoder.finish()]);
   }

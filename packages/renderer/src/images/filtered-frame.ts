@@ -4,7 +4,7 @@ import { BUFFER_USAGE, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { FullScreenStage } from '../stages/full-screen.js';
 import { SceneDepth } from '../scene-depth.js';
-import { ImageTensor, type ImageShape } from './picture-tensor.js';
+import { ImageTensor, type ImageShape } from './image-tensor.js';
 
 /** An output image of a model on the GPU. */
 export interface ModelImage {
@@ -73,8 +73,8 @@ export class FilteredFrame {
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#uniform = device.createBuffer({ label: 'gs.filter.uniform', size: layouts.TensorToImage.size, usage });
     this.#shown = {
-      drawn: this.#present.bind({ picture: this.drawn.createView() }),
-      filtered: this.#present.bind({ picture: this.#filteredView }),
+      drawn: this.#present.bind({ source: this.drawn.createView() }),
+      filtered: this.#present.bind({ source: this.#filteredView }),
     };
   }
 
@@ -130,9 +130,9 @@ export class FilteredFrame {
   }
 
   /** Copies one of the images into a texture of the same size. */
-  present(picture: 'drawn' | 'filtered', target: GPUTexture): void {
+  present(image: 'drawn' | 'filtered', target: GPUTexture): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.present' });
-    this.#present.record(encoder, this.#shown[picture], target.createView(), target.format);
+    this.#present.record(encoder, this.#shown[image], target.createView(), target.format);
     this.#device.queue.submit([encoder.finish()]);
   }
 

@@ -94,7 +94,7 @@ export class ImageTensor {
     this.#writeUniform(part.width, part.height, fit, view);
     let bindings = this.#bindings.get(texture);
     if (bindings === undefined) {
-      bindings = this.#kernel.bind({ image: this.#uniform, picture: texture.createView(), tensor: this.buffer });
+      bindings = this.#kernel.bind({ image: this.#uniform, source: texture.createView(), tensor: this.buffer });
       this.#bindings.set(texture, bindings);
     }
     const encoder = this.#device.createCommandEncoder({ label: 'gs.picture' });
@@ -111,8 +111,8 @@ export class ImageTensor {
    */
   upload(source: GPUCopyExternalImageSource, fit: ImageFit = 'cover', view = 0): void {
     const { width, height } = sizeOf(source);
-    const most = this.#device.limits.maxTextureDimension2D;
-    if (!(width > 0 && height > 0 && width <= most && height <= most)) throw wrongSize(width, height, most);
+    const max = this.#device.limits.maxTextureDimension2D;
+    if (!(width > 0 && height > 0 && width <= max && height <= max)) throw wrongSize(width, height, max);
     const { copyDestination, textureBinding, renderAttachment } = TEXTURE_USAGE;
     const texture = this.#device.createTexture({
       label: 'gs.picture',
@@ -160,10 +160,10 @@ const oddHalves = (width: number, height: number): GaussianSplatError =>
     remedy: 'export the model for images of an even width',
   });
 
-const wrongSize = (width: number, height: number, most: number): GaussianSplatError =>
+const wrongSize = (width: number, height: number, max: number): GaussianSplatError =>
   new GaussianSplatError('argument/value', {
     where: 'an image for a model',
-    expected: `1 to ${most} pixels across and down`,
+    expected: `1 to ${max} pixels across and down`,
     found: `${width} x ${height}`,
     remedy: 'wait until the image has loaded, or give a smaller one',
   });

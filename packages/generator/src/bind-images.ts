@@ -10,24 +10,24 @@ import type { GeneratorState } from './state.js';
  * @throws GaussianSplatError `argument/value` for an image that is missing, or has another size or element type than
  * the input.
  */
-export function bindPictures(
+export function bindImages(
   header: OnnxHeader,
   contract: Contract,
   state: GeneratorState,
   given: ReadonlySet<string>,
 ): Record<string, GpuTensor> {
-  const pictures: Record<string, GpuTensor> = {};
+  const images: Record<string, GpuTensor> = {};
   for (const input of header.inputs) {
     const { role } = contract.inputs[input.name];
     if ((role !== 'image' && role !== 'depth') || given.has(input.name)) continue;
-    const picture = role === 'depth' ? state.depth : state.pictures?.[input.name];
-    if (picture === undefined) throw missing(input, role);
-    if (!fits(picture, input)) throw misfit(picture, input, role);
+    const image = role === 'depth' ? state.depth : state.images?.[input.name];
+    if (image === undefined) throw missing(input, role);
+    if (!fits(image, input)) throw misfit(image, input, role);
     // Copied, because the owner may modify it.
-    const { buffer, dtype, dims, version } = picture;
-    pictures[input.name] = { buffer, dtype, dims: dimsFor(input, dims), version };
+    const { buffer, dtype, dims, version } = image;
+    images[input.name] = { buffer, dtype, dims: dimsFor(input, dims), version };
   }
-  return pictures;
+  return images;
 }
 
 function fits({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor): boolean {

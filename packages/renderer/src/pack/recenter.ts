@@ -13,7 +13,7 @@ const FAR = 16;
  * float32 coordinates of a million, and a camera matrix in float32 would then round the whole image to their steps.
  * Clouds near their origin are returned unchanged.
  */
-export function recentred(cloud: GaussianCloud): GaussianCloud {
+export function recentered(cloud: GaussianCloud): GaussianCloud {
   const columns = [0, 1, 2].map((axis) => sampleOf(cloud, axis));
   if (columns[0].length === 0) return cloud;
   const middle = columns.map((values) => values[values.length >> 1]);

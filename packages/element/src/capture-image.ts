@@ -4,7 +4,7 @@ import type { ViewController } from './controllers/view-controller.js';
 import { wasLost } from './gpu/device-failures.js';
 import type { ImageOptions } from './viewing.js';
 
-export interface PictureHost {
+export interface ImageHost {
   readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement | null;
   readonly view: Pick<ViewController, 'backend'>;
@@ -23,7 +23,7 @@ export type Rgba = readonly [red: number, green: number, blue: number, alpha: nu
 /** Message for an image whose device was lost. */
 const LOST = 'The GPU device was lost before the image was drawn: take it again after the event contextrestored';
 
-export async function takePicture(host: PictureHost, options: ImageOptions): Promise<Blob> {
+export async function takeImage(host: ImageHost, options: ImageOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
   await host.present();
   const { backend } = host.view;
@@ -49,14 +49,14 @@ export const nothingToDraw = (): DOMException =>
   );
 
 /** One side alone keeps the aspect ratio of the element. @returns null without either */
-function sizeOf({ width, height }: ImageOptions, canvas: HTMLCanvasElement | null, most: number): PixelSize | null {
+function sizeOf({ width, height }: ImageOptions, canvas: HTMLCanvasElement | null, max: number): PixelSize | null {
   if (canvas === null || (width === undefined && height === undefined)) return null;
   const aspect = canvas.width / canvas.height;
   const size = { width: Math.round(width ?? height! * aspect), height: Math.round(height ?? width! / aspect) };
-  const isDrawable = (side: number): boolean => side >= 1 && side <= most;
+  const isDrawable = (side: number): boolean => side >= 1 && side <= max;
   if (!isDrawable(size.width) || !isDrawable(size.height))
     throw new RangeError(
-      `toBlob(): expected an image of 1 to ${most} pixels to a side, which is what this GPU can draw, found ${size.width} x ${size.height}`,
+      `toBlob(): expected an image of 1 to ${max} pixels to a side, which is what this GPU can draw, found ${size.width} x ${size.height}`,
     );
   return size;
 }
@@ -72,7 +72,7 @@ function rgbaOf(color: string): Rgba {
 }
 
 /** The canvas with the CSS filters of its element applied. */
-function withFilters(host: PictureHost, drawn: HTMLCanvasElement): HTMLCanvasElement {
+function withFilters(host: ImageHost, drawn: HTMLCanvasElement): HTMLCanvasElement {
   const filter = [drawn, host.element]
     .map((node) => getComputedStyle(node).filter)
     .filter((text) => text !== '' && text !== 'none')

@@ -1,6 +1,6 @@
 // Compares an image with a reference: squared differences of the three colors, over the pixels that the reference
 // covers, summed for each tile.
-#import shared/picture_sums
+#import shared/image_sums
 
 // Premultiplied red, green, blue and alpha.
 @group(0) @binding(0) var image: texture_2d<f32>;

@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { composeLinear } from './generated/linear-shaders.js';
 import { perDevice, SHADER_STAGE, ShaderProgram, TEXTURE_USAGE, type Resource } from './gpu/kernel.js';
-import type { Composer, Target } from './frame-target.js';
+import type { Compositor, Target } from './frame-target.js';
 
 /**
  * Colors of a target that holds linear light, for example of a host with a later output pass, or of a `-srgb` format.
@@ -12,7 +12,7 @@ import type { Composer, Target } from './frame-target.js';
  * viewpoint.draw(camera, { target, background: 'load', colors });
  * ```
  */
-export class LinearColours implements Composer {
+export class LinearColors implements Compositor {
   readonly #device: GPUDevice;
   readonly #program: ShaderProgram<typeof composeLinear>;
   /** A copy of the previous content of the target. */
