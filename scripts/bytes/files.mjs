@@ -42,8 +42,8 @@ export function halfTurned(cloud) {
 }
 
 export async function read(path) {
-  const openPart = async (part) => new Uint8Array(readFileSync(join(path, '..', part)));
-  return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openFile: openPart });
+  const openFile = async (part) => new Uint8Array(readFileSync(join(path, '..', part)));
+  return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openFile });
 }
 
 /** The least of three times, ms, and what was read. */

@@ -110,17 +110,17 @@ test('a scene that has room for all is, without an error, the picture of the sce
     boxes: 3,
     environment: pick(pebbles(300, 4), [...Array(300).keys()], 2),
   });
-  const openPart = (path: string): Promise<Uint8Array> => Promise.resolve(folder.files.get(path)!);
+  const openFile = (path: string): Promise<Uint8Array> => Promise.resolve(folder.files.get(path)!);
   const log: string[] = [];
   const { scene } = await openLod(device, folder.index, (path) => {
     log.push(path);
-    return openPart(path);
+    return openFile(path);
   });
   assert.ok(
     log.every((path) => /^(3_0|env)\//.test(path)),
     'the coarsest first',
   );
-  const cloud = await readScene(folder.index, { name: 'lod-meta.json', openFile: openPart, level: 'all' });
+  const cloud = await readScene(folder.index, { name: 'lod-meta.json', openFile, level: 'all' });
   const whole = await GaussianBuffers.upload(device, packLevelRuns(cloud));
   const [streaming, loaded] = [new Renderer(device, options), new Renderer(device, options)];
   for (const camera of [viewFrom(14), viewFrom(5, 2)]) {

@@ -161,8 +161,8 @@ test('the scene that ships is 66 dB and more from what was quantized, whatever s
 
 test('captured scenes are 66 dB and more from what was quantized', { skip: needsSharedData || onlyInLab }, async () => {
   for (const file of ['formats/playbot3.ply', 'scenes/massa.sog']) {
-    const openPart = async (path: string): Promise<Uint8Array> => sharedFile(path);
-    const cloud = await readScene(sharedFile(file), { name: file, openFile: openPart });
+    const openFile = async (path: string): Promise<Uint8Array> => sharedFile(path);
+    const cloud = await readScene(sharedFile(file), { name: file, openFile });
     const found = await closenessOf(cloud, [0.6, 1.6], serial);
     console.log(`${file}: ${found.map((db) => db.toFixed(1)).join(', ')} dB`);
     assert.ok(Math.min(...found) > 66);

@@ -86,12 +86,12 @@ test(
   { skip: needsSharedData },
   async () => {
     const folder = 'scenes/playbot-streamed/';
-    const openPart = async (path: string): Promise<Uint8Array> => sharedFile(folder + path);
+    const openFile = async (path: string): Promise<Uint8Array> => sharedFile(folder + path);
     // The three finest are left out, which only take time here.
     const index = new TextDecoder().decode(sharedFile(`${folder}lod-meta.json`));
     const bytes = new TextEncoder().encode(index.replace(/"[012]":\{"file":\d+,"offset":\d+,"count":\d+\},?/g, ''));
     const read = (level: number | 'all'): Promise<GaussianCloud> =>
-      readScene(bytes, { name: 'lod-meta.json', openFile: openPart, level });
+      readScene(bytes, { name: 'lod-meta.json', openFile, level });
     const device = await anyDevice();
     const upload = async (level: number | 'all'): Promise<GaussianBuffers> =>
       GaussianBuffers.upload(

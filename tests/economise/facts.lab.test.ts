@@ -26,8 +26,8 @@ const WRITERS: Readonly<Record<string, (cloud: GaussianCloud) => Promise<Gaussia
   sog: async (cloud) => readScene(await writeSog(cloud, fine), { name: 'a.sog' }),
   'lod-meta': async (cloud) => {
     const files = await writeStreamedSog(cloud, fine);
-    const openPart = async (path: string): Promise<Uint8Array> => files.get(path)!;
-    return readScene(files.get('lod-meta.json')!, { name: 'lod-meta.json', openFile: openPart });
+    const openFile = async (path: string): Promise<Uint8Array> => files.get(path)!;
+    return readScene(files.get('lod-meta.json')!, { name: 'lod-meta.json', openFile });
   },
 };
 

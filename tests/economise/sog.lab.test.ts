@@ -177,9 +177,9 @@ test('a streamed scene: the finest levels of all boxes are the scene, each coars
   for (const own of counts) {
     for (let level = 1; level < own.length; level++) assert.equal(own[level - 1], Math.ceil(own[level] / 4));
   }
-  const openPart = async (path: string): Promise<Uint8Array> => files.get(path)!;
+  const openFile = async (path: string): Promise<Uint8Array> => files.get(path)!;
   const levelAt = (level: number): Promise<GaussianCloud> =>
-    readScene(index, { name: 'lod-meta.json', openFile: openPart, level });
+    readScene(index, { name: 'lod-meta.json', openFile, level });
   const finest = await levelAt(0);
   const plain = await read(await writeSog(cloud, { steps: FINEST, palette: 64, encodeWebp, effort: 0 }));
   assert.equal(finest.count, plain.count);

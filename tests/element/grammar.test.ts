@@ -51,14 +51,14 @@ test('lengths of late code: above 0, with a unit', () => {
 });
 
 test('orbits', () => {
-  assert.deepEqual(orbit.parse('90deg 1rad 2m'), { theta: 90 * DEGREE, phi: 1, radius: { metres: 2 } });
-  assert.deepEqual(orbit.parse('  -10.5deg\t0   150cm '), { theta: -10.5 * DEGREE, phi: 0, radius: { metres: 1.5 } });
+  assert.deepEqual(orbit.parse('90deg 1rad 2m'), { theta: 90 * DEGREE, phi: 1, radius: { meters: 2 } });
+  assert.deepEqual(orbit.parse('  -10.5deg\t0   150cm '), { theta: -10.5 * DEGREE, phi: 0, radius: { meters: 1.5 } });
   assert.deepEqual(orbit.parse('auto auto 105%'), { theta: 'auto', phi: 'auto', radius: { framings: 1.05 } });
   assert.deepEqual(orbit.parse('auto'), { theta: 'auto', phi: 'auto', radius: 'auto' });
   // As in <model-viewer>, what is left out at the end is automatic.
   assert.deepEqual(orbit.parse('45deg'), { theta: 45 * DEGREE, phi: 'auto', radius: 'auto' });
   assert.deepEqual(orbit.parse('45deg 1rad'), { theta: 45 * DEGREE, phi: 1, radius: 'auto' });
-  assert.deepEqual(orbit.parse('1E1DEG .5rad 20MM'), { theta: 10 * DEGREE, phi: 0.5, radius: { metres: 0.02 } });
+  assert.deepEqual(orbit.parse('1E1DEG .5rad 20MM'), { theta: 10 * DEGREE, phi: 0.5, radius: { meters: 0.02 } });
 });
 
 test('malformed orbits', () => {
@@ -107,7 +107,7 @@ test('what the getters print, the attributes read back to the last bit', () => {
     fc.property(number, number, positive, (theta, phi, radius) => {
       const parsed = orbit.parse(new CameraOrbit(theta, phi, radius, 1).toString());
       // Printing loses the sign of zero, which means nothing here.
-      assert.deepEqual(parsed, { theta: theta + 0, phi: phi + 0, radius: { metres: radius } });
+      assert.deepEqual(parsed, { theta: theta + 0, phi: phi + 0, radius: { meters: radius } });
     }),
   );
   fc.assert(

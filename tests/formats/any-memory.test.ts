@@ -40,8 +40,8 @@ for (const [format, scenes] of Object.entries(fuzzScenes())) {
   test(`${format}: Buffers at any address give the same cloud`, async () => {
     for (const { name, files } of scenes) {
       const read = (place: (bytes: Uint8Array) => Uint8Array): ReturnType<typeof readScene> => {
-        const openPart: OpenFile = async (path) => place(files[path]);
-        return readScene(place(files[name]), { name, openFile: openPart });
+        const openFile: OpenFile = async (path) => place(files[path]);
+        return readScene(place(files[name]), { name, openFile });
       };
       const expected = await read((bytes) => new Uint8Array(bytes));
       assert.ok(expected.count > 0);

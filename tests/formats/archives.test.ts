@@ -213,12 +213,11 @@ test('indices that contradict their files are refused by name', async () => {
 
 test('the real streamed scene: 7 levels', { skip: needsSharedData }, async () => {
   const folder = 'scenes/playbot-streamed/';
-  const openPart = async (path: string): Promise<Uint8Array> => sharedFile(folder + path);
+  const openFile = async (path: string): Promise<Uint8Array> => sharedFile(folder + path);
   const counts = [];
   for (const level of [3, 4, 5, 6]) {
     counts.push(
-      (await readScene(sharedFile(`${folder}lod-meta.json`), { name: 'lod-meta.json', openFile: openPart, level }))
-        .count,
+      (await readScene(sharedFile(`${folder}lod-meta.json`), { name: 'lod-meta.json', openFile, level })).count,
     );
   }
   assert.deepEqual(counts, [31_000, 8_406, 3_000, 1_873]);

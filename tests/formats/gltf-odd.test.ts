@@ -26,7 +26,7 @@ const views = json.bufferViews as View[];
 const widthOf = ({ type }: Accessor): number => ({ SCALAR: 1, VEC3: 3, VEC4: 4 })[type]!;
 const [primitive] = (json.meshes as [{ primitives: [{ attributes: Record<string, number> }] }])[0].primitives;
 
-const options = (bytes: Uint8Array) => ({ name: 'a.gltf', openPart: async () => bytes });
+const options = (bytes: Uint8Array) => ({ name: 'a.gltf', openFile: async () => bytes });
 const file = (changed: Json, bytes: Uint8Array, buffers: Json = { uri: 'a.bin' }): Uint8Array =>
   strToU8(JSON.stringify({ ...json, buffers: [{ byteLength: bytes.length, ...buffers }], ...changed }));
 const read = (changed: Json, bytes: Uint8Array) => readScene(file(changed, bytes), options(bytes));

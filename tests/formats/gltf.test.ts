@@ -183,9 +183,9 @@ test('JSON with a buffer of its own, and with one written as text', async () => 
     Buffer.from(JSON.stringify({ ...json, buffers: [{ uri, byteLength: buffer.length }] }));
   const embedded = `data:application/octet-stream;base64,${buffer.toString('base64')}`;
   assertSameCloud(await readScene(text(embedded), { name: 'a.gltf' }), inside);
-  const openPart = async (path: string): Promise<Uint8Array> => (assert.equal(path, 'a b.bin'), new Uint8Array(buffer));
-  assertSameCloud(await readScene(text('a%20b.bin'), { name: 'a.gltf', openFile: openPart }), inside);
-  assertSameCloud(await readScene(text('a%20b.bin?v=3#x'), { name: 'a.gltf', openFile: openPart }), inside);
+  const openFile = async (path: string): Promise<Uint8Array> => (assert.equal(path, 'a b.bin'), new Uint8Array(buffer));
+  assertSameCloud(await readScene(text('a%20b.bin'), { name: 'a.gltf', openFile }), inside);
+  assertSameCloud(await readScene(text('a%20b.bin?v=3#x'), { name: 'a.gltf', openFile }), inside);
   await expectRefusal(text('b.bin'), 'decode/unsupported', /only this one.*, s\/scene\.glb/, { name: 's/a.gltf' });
 });
 
@@ -238,8 +238,8 @@ test('copies are bounded, and what is in the file once is not', async () => {
   };
   const file = Buffer.from(JSON.stringify(large));
   assert.ok(count > 4_096 * file.length, `${file.length} bytes`);
-  const openPart = async (): Promise<Uint8Array> => new Uint8Array(new Float32Array(4 * count).fill(0.5).buffer);
-  assert.equal((await readScene(file, { name: 'a.gltf', openFile: openPart })).count, count);
+  const openFile = async (): Promise<Uint8Array> => new Uint8Array(new Float32Array(4 * count).fill(0.5).buffer);
+  assert.equal((await readScene(file, { name: 'a.gltf', openFile })).count, count);
 });
 
 test('what the extension allows and we do not draw is refused by name', async () => {

@@ -65,7 +65,7 @@ test('box by box, with one request for a bundle', async () => {
 test('a bundle without a scene, or a damaged one, is told by its name', async () => {
   const with1 = (bytes: Uint8Array) => ({
     name: 'lod-meta.json',
-    openPart: (path: string) => (path === '1_0.sog' ? Promise.resolve(bytes) : open(path)),
+    openFile: (path: string) => (path === '1_0.sog' ? Promise.resolve(bytes) : open(path)),
     level: 1,
   });
   const empty = with1(zipSync({ 'readme.txt': strToU8('x'), '__MACOSX/meta.json': strToU8('x') }));

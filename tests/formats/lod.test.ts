@@ -49,9 +49,9 @@ class Server {
 }
 
 const scene = readLodScene(folder.index, 'lod-meta.json', INDEX);
-const openPart = (path: string): Promise<Uint8Array> => Promise.resolve(folder.files.get(path)!);
+const openFile = (path: string): Promise<Uint8Array> => Promise.resolve(folder.files.get(path)!);
 const reading = (level: number | 'all'): ReturnType<typeof readScene> =>
-  readScene(folder.index, { name: 'lod-meta.json', openFile: openPart, level });
+  readScene(folder.index, { name: 'lod-meta.json', openFile, level });
 
 test('the index in both dialects: boxes with their runs, the coarsest first, at absolute addresses', () => {
   assert.equal(scene.boxes.length, 4);

@@ -68,11 +68,11 @@ test('of a beginning that announces more than it can hold nothing is inflated', 
 
 test('a large scene is previewed before it is whole', { skip: needsSharedData }, async () => {
   const folder = 'scenes/playbot-streamed/1_0/';
-  const openPart = async (path: string): Promise<Uint8Array> => sharedFile(folder + path);
+  const openFile = async (path: string): Promise<Uint8Array> => sharedFile(folder + path);
   const previews: [count: number, degree: number][] = [];
   const cloud = await readScene(sharedFile(`${folder}meta.json`), {
     name: 'meta.json',
-    openFile: openPart,
+    openFile,
     onPreview: ({ count, shDegree }) => void previews.push([count, shDegree]),
   });
   assert.deepEqual([cloud.count, cloud.shDegree], [250_000, 2]);

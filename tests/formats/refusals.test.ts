@@ -70,10 +70,10 @@ test('pages and pointers in place of a part of a scene are told as such', async 
   }
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
   const gltf = text(JSON.stringify({ ...json, buffers: [{ uri: 'a.bin', byteLength: buffer.length }] }));
-  const openPart = brings('a.bin', page);
+  const openFile = brings('a.bin', page);
   await expectRefusal(gltf, 'decode/html', /scene\.gltf, a\.bin .*web page/, {
     name: 'scene.gltf',
-    openFile: openPart,
+    openFile,
   });
   const { boxes } = readLodScene(lod, 'lod-meta.json', 'https://x.test/lod-meta.json');
   const fetch = async (url: string): Promise<Uint8Array> => brings('quats.webp', page)(new URL(url).pathname.slice(3));

@@ -104,10 +104,10 @@ test('tiles without splats are left out with a warning, and a tileset of them is
   const files = { ...TREE, 'mesh.gltf': mesh, 'tileset.json': tileset(tile(undefined, { children })) };
   assert.match((await readTiles(files)).warnings!.join(), /1 tiles? without splats/);
   const none = tileset(tile('mesh.gltf'));
-  const openPart = (): Promise<Uint8Array> => Promise.resolve(mesh);
+  const openFile = (): Promise<Uint8Array> => Promise.resolve(mesh);
   await expectRefusal(none, 'decode/unsupported', /KHR_gaussian_splatting.*1 tiles without/, {
     name: 'a.json',
-    openFile: openPart,
+    openFile,
   });
 });
 

@@ -38,8 +38,8 @@ const FORMATS: readonly {
 ];
 
 const load = async (file: string, level = 0): Promise<GaussianCloud> => {
-  const openPart = async (path: string): Promise<Uint8Array> => sharedFile(join(dirname(file), path));
-  const cloud = await readScene(sharedFile(file), { name: file, openFile: openPart, level });
+  const openFile = async (path: string): Promise<Uint8Array> => sharedFile(join(dirname(file), path));
+  const cloud = await readScene(sharedFile(file), { name: file, openFile, level });
   // Made in right-up-back for these tests.
   return file.endsWith('.spz') ? halfTurned(cloud) : cloud;
 };

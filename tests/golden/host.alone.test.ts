@@ -1,4 +1,4 @@
-/** A host's frame: recorded into its encoder, over its content, in its colours, from its matrices, several views at once. */
+/** A host's frame: recorded into its encoder, over its content, in its colors, from its matrices, several views at once. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { cameraFromProjection, multiply, type Camera, type Vector3 } from '@gaussian-splat/core';
@@ -83,17 +83,17 @@ for (const how of BOTH) {
     scene.destroy();
   });
 
-  test(`${how.rasterizer}: over linear light splats are blended in encoded colours`, async () => {
+  test(`${how.rasterizer}: over linear light splats are blended in encoded colors`, async () => {
     const device = await serialDevice();
     const { world, scene } = await skullWorld(device);
     const viewpoint = new Viewpoint(device, world, { settings: how });
     const expected = await capture(device, viewpoint, { camera, over: [...CLEAR, 1] });
-    const colours = new LinearColors(device);
+    const colors = new LinearColors(device);
     for (const format of ['rgba16float', 'rgba8unorm-srgb'] as const) {
       const texture = target(device, format);
       const encoder = device.createCommandEncoder();
       clear(encoder, texture, CLEAR.map(decode));
-      viewpoint.record(encoder, camera, { target: texture, over: 'target', colors: colours });
+      viewpoint.record(encoder, camera, { target: texture, over: 'target', colors });
       device.queue.submit([encoder.finish()]);
       const found = await readTexture(device, texture);
       const isEncoded = format.endsWith('-srgb');
@@ -107,8 +107,8 @@ for (const how of BOTH) {
       texture.destroy();
     }
     const texture = target(device, 'rgba8unorm-srgb');
-    assert.throws(() => viewpoint.draw(camera, { target: texture, over: 'target' }), { where: 'FrameTarget.colours' });
-    colours.destroy();
+    assert.throws(() => viewpoint.draw(camera, { target: texture, over: 'target' }), { where: 'FrameTarget.colors' });
+    colors.destroy();
     viewpoint.destroy();
     scene.destroy();
   });
@@ -208,7 +208,7 @@ test('bad requests are named', async () => {
     ['no target', () => viewpoint.draw(camera, {} as FrameTarget), 'FrameTarget.target'],
     ['a view without its format', () => viewpoint.draw(camera, { target: {} as GPUTexture }), 'FrameTarget.target'],
     ['depth of several samples', () => host(texture('depth32float', { sampleCount: 4 })), 'HostDepth.texture'],
-    ['depth in colours', () => host(texture('rgba8unorm')), 'HostDepth.texture'],
+    ['depth in colors', () => host(texture('rgba8unorm')), 'HostDepth.texture'],
     ['depth that nobody may read', () => host(texture('depth32float', { usage: 0x10 })), 'HostDepth.texture'],
     ['no depth', () => new SceneDepth(device, {}), 'SceneDepth'],
     [

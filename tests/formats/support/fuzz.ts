@@ -243,7 +243,7 @@ async function readDamaged(
   tally: FuzzTally,
   where: string,
 ): Promise<void> {
-  const openPart = async (path: string): Promise<Uint8Array> => {
+  const openFile = async (path: string): Promise<Uint8Array> => {
     const file = files[path];
     if (file) return file;
     throw new GaussianSplatError('network/status', {
@@ -256,7 +256,7 @@ async function readDamaged(
   const before = process.memoryUsage().arrayBuffers;
   const start = performance.now();
   try {
-    validateCloud(await readScene(files[name], { name, openFile: openPart, onPreview: () => undefined }));
+    validateCloud(await readScene(files[name], { name, openFile, onPreview: () => undefined }));
     tally.read++;
   } catch (error) {
     if (!(error instanceof GaussianSplatError)) throw new Error(`${where}: an error without a name`, { cause: error });

@@ -15,8 +15,8 @@ async function read(file: Uint8Array, beside: string, isMesh: boolean): Promise<
     const sequence = parseSequence(file, 'a');
     return `${sequence.frameCount} frames, ${framePath(sequence, sequence.frameCount - 1).length} characters`;
   }
-  const openPart = existsSync(beside) ? async () => new Uint8Array(readFileSync(beside)) : undefined;
-  return `${(await readScene(file, { name: 'a', openFile: openPart })).count} splats`;
+  const openFile = existsSync(beside) ? async () => new Uint8Array(readFileSync(beside)) : undefined;
+  return `${(await readScene(file, { name: 'a', openFile })).count} splats`;
 }
 
 /** Most memory so far, bytes. What `resourceUsage` tells may be that of the process which started this one; on Linux its own is known. */

@@ -129,7 +129,7 @@ export const angleGrammar = (fallback: string): AttributeGrammar<number> => ({
 
 /** `camera-target`. */
 export const targetGrammar: AttributeGrammar<TargetSetting> = {
-  expected: '"x y z" in metres (or with m, cm or mm); "auto" for each, or left out from the end',
+  expected: '"x y z" in meters (or with m, cm or mm); "auto" for each, or left out from the end',
   fallback: 'auto',
   parse: parseTarget,
 };

@@ -6,7 +6,7 @@ const terms = (text: string): string[] => text.trim().split(/\s+/);
 
 /** `position`. */
 export const pointGrammar: AttributeGrammar<Vector3> = {
-  expected: '"x y z" in metres (or with m, cm or mm)',
+  expected: '"x y z" in meters (or with m, cm or mm)',
   fallback: '0 0 0',
   parse: parsePoint,
 };
@@ -40,7 +40,7 @@ export const opacityGrammar = numberGrammar(1, 0, 'a number from 0 to 1', 1);
 
 /** `crop`: two corners; undefined for no crop. */
 export const boxGrammar: AttributeGrammar<readonly number[] | undefined> = {
-  expected: '"x y z x y z" in metres, two corners of a box, the least first',
+  expected: '"x y z x y z" in meters, two corners of a box, the least first',
   fallback: 'none',
   parse: (text) => {
     if (text === 'none') return undefined;

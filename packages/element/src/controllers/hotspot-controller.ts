@@ -196,7 +196,7 @@ export class HotspotController implements ReactiveController {
     const read = (name: string, text: string | undefined): Located['position'] => {
       const point = text === undefined ? null : parsePoint(text);
       if (text !== undefined && point === null)
-        this.#of.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in metres, found "${text.slice(0, 200)}".`);
+        this.#of.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in meters, found "${text.slice(0, 200)}".`);
       return point;
     };
     const position = read('data-position', dataset.position);
