@@ -18,8 +18,14 @@ const RADIUS = 3;
 const ROUNDS = 3;
 /** Fraction of splats with equal indices that must match for indices to identify splats. */
 const SAME_NUMBERS = 0.9;
-/** Passes over the unmatched splats, with a radius from their own distances, and the maximum cost of their pairs. */
-const SPARSE_PASSES = 2;
+/** A pair is doubtful if its cost of looks is above this multiple of the median, and above a minimum. */
+const DOUBT = 9;
+const MIN_DOUBT = 0.1;
+/**
+ * Passes over the unmatched splats, with a radius from their own distances, and the maximum cost of their pairs. All but
+ * the last find pairs of the same looks.
+ */
+const SPARSE_PASSES = 3;
 const SPARSE_COST = 2;
 const MIN_SIZE = 1e-12;
 
@@ -33,6 +39,7 @@ export interface Features {
 }
 
 const LOOKS = 11;
+const OPACITY = 4;
 
 export function featuresOf(cloud: GaussianCloud, origin: readonly number[]): Features {
   const { count, scales, opacities, sh, shDegree } = cloud;
@@ -86,6 +93,8 @@ export function matchFrames(before: Features, next: Features): Int32Array {
   const found = new Int32Array(next.count).fill(-1);
   let looking: Uint32Array = Uint32Array.from({ length: before.count }, (_, i) => i);
   byPlace(before, next, { grid, looking, found, max: MAX_COST });
+  const { doubtful, limit } = doubtfulOf(before, next, found);
+  for (const { j } of doubtful) found[j] = -1;
   // Fast and sparse splats, such as spray, move farther than the typical distance of neighbors.
   for (let pass = 0; pass < SPARSE_PASSES; pass++) {
     const open = whichOf(found, (owner) => owner < 0);
@@ -98,13 +107,50 @@ export function matchFrames(before: Features, next: Features): Int32Array {
     byPlace(before, rest, {
       ...{ grid: PlaceGrid.of(rest.positions, rest.count, RADIUS), looking, found: own },
       max: SPARSE_COST,
+      maxLooks: pass < SPARSE_PASSES - 1 ? limit : Infinity,
     });
     own.forEach((owner, k) => (found[open[k]] = owner));
   }
+  const isFound = new Uint8Array(before.count);
+  for (const owner of found) if (owner >= 0) isFound[owner] = 1;
+  for (const { i, j } of doubtful) if (found[j] < 0 && isFound[i] === 0) found[j] = i;
   return found;
 }
 
-const whichOf = (values: Int32Array | Uint8Array, is: (value: number) => boolean): Uint32Array => {
+interface Pair {
+  readonly i: number;
+  readonly j: number;
+}
+
+/**
+ * Pairs whose looks differ by much more than those of most pairs: the true partner may have moved farther than the
+ * search went, as after a birth, when the velocity is unknown. They search again, and return to one another if neither
+ * finds another partner.
+ */
+function doubtfulOf(before: Features, next: Features, found: Int32Array): { doubtful: readonly Pair[]; limit: number } {
+  const apart = new Float32Array(next.count).fill(-1);
+  found.forEach((i, j) => {
+    if (i >= 0) apart[j] = lookCost(before, i, next, j);
+  });
+  const sorted = apart.filter((cost) => cost >= 0).sort();
+  const limit = Math.max(MIN_DOUBT, DOUBT * (sorted[sorted.length >> 1] ?? 0));
+  return {
+    limit,
+    doubtful: Array.from(
+      whichOf(apart, (cost) => cost > limit),
+      (j) => ({ i: found[j], j }),
+    ),
+  };
+}
+
+/** Cost of different colors, sizes and shapes; opacity is left out, because births and deaths are fades. */
+function lookCost(a: Features, i: number, b: Features, j: number): number {
+  let cost = 0;
+  for (let k = 0; k < LOOKS; k++) if (k !== OPACITY) cost += (a.looks[LOOKS * i + k] - b.looks[LOOKS * j + k]) ** 2;
+  return cost;
+}
+
+const whichOf = (values: Int32Array | Uint8Array | Float32Array, is: (value: number) => boolean): Uint32Array => {
   const found: number[] = [];
   for (let i = 0; i < values.length; i++) if (is(values[i])) found.push(i);
   return Uint32Array.from(found);
@@ -147,10 +193,12 @@ interface Search {
   /** [splats of the next frame] index in the previous one, or -1; written. */
   readonly found: Int32Array;
   readonly max: number;
+  /** Maximum cost of looks; default: no limit. */
+  readonly maxLooks?: number;
 }
 
 /** Finds the cheapest pairs: if several splats choose the same one, the nearest gets it, and the others search again. */
-function byPlace(before: Features, next: Features, { grid, found, max, ...search }: Search): void {
+function byPlace(before: Features, next: Features, { grid, found, max, maxLooks = Infinity, ...search }: Search): void {
   const costs = new Float32Array(next.count);
   let { looking } = search;
   for (let round = 0; round < ROUNDS && looking.length > 0; round++) {
@@ -161,7 +209,7 @@ function byPlace(before: Features, next: Features, { grid, found, max, ...search
       grid.forEachNear(before.positions, i, (j) => {
         if (isOpen[j] === 0) return false;
         const cost = costOf(before, i, next, j, grid.cell, min);
-        if (cost >= min) return false;
+        if (cost >= min || (maxLooks < cost && lookCost(before, i, next, j) > maxLooks)) return false;
         [best, min] = [j, cost];
         return cost < SURE;
       });
