@@ -48,3 +48,27 @@ test('a rate of 0 stands: no frame is asked for, and no time has passed when it 
   for (const now of [9000, 9500]) playback.tick(now);
   assert.equal(playback.currentTime, 2);
 });
+
+test('a frame that comes late does not pass over times that are not loaded: the clock stops at them, and says so', () => {
+  const { playback, events } = clock();
+  playback.play();
+  playback.tick(0, 1.5);
+  playback.tick(9000, 1.5);
+  assert.deepEqual([playback.currentTime, playback.ended], [1.5, false]);
+  playback.tick(9016, 1.5);
+  assert.equal(events.filter((type) => type === 'waiting').length, 1);
+  playback.tick(9500);
+  playback.tick(10_000);
+  assert.deepEqual([playback.currentTime, events.slice(-4, -2)], [2, ['canplay', 'playing']]);
+});
+
+test('a clock that starts again before a time that is not loaded says that it waits', () => {
+  const { playback, events } = clock();
+  playback.play();
+  playback.tick(0, 1.5);
+  playback.tick(1500, 1.5);
+  playback.suspend();
+  playback.tick(1516, 1.5);
+  playback.tick(1532, 1.5);
+  assert.equal(events.filter((type) => type === 'waiting').length, 1);
+});

@@ -75,7 +75,9 @@ export abstract class MediaProperties extends SplatProperties {
   /** Same as on HTMLMediaElement: 0 without a scene, 4 once it is shown, 2 while a clip waits for its next frames. */
   get readyState(): number {
     if (this.core.sources.state !== 'ready') return HAVE_NOTHING;
-    return this.#live?.isLacking?.(this.currentTime) ? HAVE_CURRENT_DATA : HAVE_ENOUGH_DATA;
+    return (this.#live?.loadedUntil?.(this.currentTime) as number) <= this.currentTime
+      ? HAVE_CURRENT_DATA
+      : HAVE_ENOUGH_DATA;
   }
 
   /** Seekable times: the whole of a scene with an end, none of others. */

@@ -189,12 +189,12 @@ export class PlaybackController {
   /**
    * Advances to the time of a frame.
    * @param now requestAnimationFrame's clock, ms.
-   * @param isLacking Whether the frame at the current time is missing: the clock waits for it.
+   * @param until Time of the next frame that is not loaded, s: the clock stops there and waits for it.
    */
-  tick(now: number, isLacking = false): void {
+  tick(now: number, until = Infinity): void {
     if (this.#isPaused || Number.isNaN(this.#duration)) return;
-    if (isLacking) {
-      if (this.#lastTick !== undefined) this.#host.playbackEvent('waiting');
+    if (until <= this.#time) {
+      if (!this.#isWaiting) this.#host.playbackEvent('waiting');
       this.#isWaiting = true;
       return this.suspend();
     }
@@ -203,7 +203,7 @@ export class PlaybackController {
     if (this.#lastTick === undefined) this.#host.playbackEvent('playing');
     const elapsed = this.#lastTick === undefined ? 0 : (now - this.#lastTick) / 1000;
     this.#lastTick = now;
-    this.#advance(elapsed * this.#rate);
+    this.#advance(Math.min(elapsed * this.#rate, until - this.#time));
     if (this.#isPaused) return;
     if (now - this.#lastUpdate >= UPDATE_INTERVAL_MS) {
       this.#lastUpdate = now;

@@ -107,9 +107,11 @@ export class ClipPlayer implements Timeline {
     return spans;
   }
 
-  isLacking(timeSeconds: number): boolean {
-    const group = clipGroupAt(this.#index, frameAt(this.#index, timeSeconds));
-    return !this.#cache.get(group, 0) && !this.#cache.isMissing(group, 0);
+  loadedUntil(timeSeconds: number): number {
+    const { groups, framesPerSecond } = this.#index;
+    let group = clipGroupAt(this.#index, frameAt(this.#index, timeSeconds));
+    while (group < groups.length && (this.#cache.get(group, 0) || this.#cache.isMissing(group, 0))) group++;
+    return group < groups.length ? Math.max(timeSeconds, groups[group].first / framesPerSecond) : Infinity;
   }
 
   /** Shows the frame at a time, if it is loaded; fetches the following ones. */

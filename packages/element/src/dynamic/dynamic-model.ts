@@ -41,8 +41,10 @@ export interface Timeline {
   readonly settable?: readonly string[];
   /** Requests the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
   request(state: DynamicState, camera: Camera): void;
-  /** Whether the frame at a time is not loaded, so that the clock waits; absent if it never waits. */
-  isLacking?(timeSeconds: number): boolean;
+  /**
+   * Returns the first time from `timeSeconds` on whose frame is not loaded, or Infinity; absent if the clock never waits.
+   */
+  loadedUntil?(timeSeconds: number): number;
   /** [start, end] of the times that need no more bytes, seconds; absent for all. */
   readonly buffered?: readonly (readonly [start: number, end: number])[];
   close(): void;

@@ -116,7 +116,7 @@ export class DynamicWiring implements PostHost {
   advance({ live }: LoadedGaussians, camera: Camera, now: number): void {
     if (live === undefined) return;
     const { playback } = this.#host;
-    playback.tick(now, live.isLacking?.(playback.currentTime));
+    playback.tick(now, live.loadedUntil?.(playback.currentTime));
     try {
       live.request(this.state, camera);
     } catch (error) {
