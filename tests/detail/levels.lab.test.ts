@@ -8,7 +8,6 @@ import { GaussianBuffers, StreamedGaussians, type PageSource } from '@gaussian-s
 import { levelSource, packLevelPage, packLevelRuns } from '@gaussian-splat/renderer/tools';
 import { constants, NONE, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { onlyInLab } from '../support/extent.js';
 import { checkBoxes } from '../support/covered-boxes.js';
 import { randomSource } from '../support/gpu.js';
 import { heaps } from '../support/scenes/heaps.js';
@@ -180,7 +179,7 @@ test('a pool without room for the coarsest levels is refused, and so are pages o
 
 test(
   'a real streamed scene, from a small pool without a hole, and from one with room for all as loaded whole',
-  { skip: needsSharedData || onlyInLab },
+  { skip: needsSharedData },
   async () => {
     const folder = 'scenes/playbot-streamed/';
     const device = await anyDevice();

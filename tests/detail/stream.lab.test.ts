@@ -13,7 +13,7 @@ import {
 import { packWithDetail, readPacked } from '@gaussian-splat/renderer/tools';
 import { constants, listPages, NONE, SLOT_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
 import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
-import { isLab, onlyInLab } from '../support/extent.js';
+import { isLab } from '../support/extent.js';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
@@ -107,37 +107,33 @@ function below(
 }
 
 const COPIES = [0, 1, 2, 3, 4, 5, 6].map((k) => [14 * (k % 3), 0, 14 * (k >> 1)] as const);
-for (const [name, make, skip] of [
-  ['one tree', () => detailFolder(pebbles(60_000)), onlyInLab] as const,
-  ['copies of a tree', () => detailFolder(pebbles(4_000), COPIES), false] as const,
+for (const [name, make] of [
+  ['one tree', () => detailFolder(pebbles(60_000))] as const,
+  ['copies of a tree', () => detailFolder(pebbles(4_000), COPIES)] as const,
 ]) {
-  test(
-    `${name}: with room for a third of the pages, every place is covered exactly once wherever the camera goes`,
-    { skip },
-    async () => {
-      const source = make();
-      const list = listPages(source.manifest);
-      const slots = Math.ceil(list.count / 3);
-      const bytes = 4 * SLOT_CHUNKS * (8 + 12 + constants.CULL_GROUP * (8 + 4));
-      const scene = await openAll(source, slots * bytes);
-      assert.equal(scene.pagesInSlots.length, slots);
-      const renderer = new Renderer(await anyDevice(), options);
-      const seen = new Set<number>();
-      let most = 0;
-      for (const [k, distance] of [30, 3, 2, 60, 1.5, 2.5].entries()) {
-        const camera = viewFrom(distance, k, [2 * k - 5, 0, 3 - k]);
-        await drawUntilCalm(scene, renderer, camera, 0.2);
-        most = Math.max(most, scene.progress.error);
-        const rows = await rowsOfPages(scene);
-        for (const page of rows.keys()) seen.add(page);
-        for (const fade of [0, 0.5]) assert.ok(checkCovered(source, rows, { camera, allowed: 0.2, fade }) > 3);
-      }
-      assert.ok(most > 0.2, `${most} pixels: the pool is too small for some of these views`);
-      assert.ok(seen.size > slots, `only ${seen.size} of ${list.count} pages were ever there: none left for another`);
-      renderer.destroy();
-      scene.destroy();
-    },
-  );
+  test(`${name}: with room for a third of the pages, every place is covered exactly once wherever the camera goes`, async () => {
+    const source = make();
+    const list = listPages(source.manifest);
+    const slots = Math.ceil(list.count / 3);
+    const bytes = 4 * SLOT_CHUNKS * (8 + 12 + constants.CULL_GROUP * (8 + 4));
+    const scene = await openAll(source, slots * bytes);
+    assert.equal(scene.pagesInSlots.length, slots);
+    const renderer = new Renderer(await anyDevice(), options);
+    const seen = new Set<number>();
+    let most = 0;
+    for (const [k, distance] of [30, 3, 2, 60, 1.5, 2.5].entries()) {
+      const camera = viewFrom(distance, k, [2 * k - 5, 0, 3 - k]);
+      await drawUntilCalm(scene, renderer, camera, 0.2);
+      most = Math.max(most, scene.progress.error);
+      const rows = await rowsOfPages(scene);
+      for (const page of rows.keys()) seen.add(page);
+      for (const fade of [0, 0.5]) assert.ok(checkCovered(source, rows, { camera, allowed: 0.2, fade }) > 3);
+    }
+    assert.ok(most > 0.2, `${most} pixels: the pool is too small for some of these views`);
+    assert.ok(seen.size > slots, `only ${seen.size} of ${list.count} pages were ever there: none left for another`);
+    renderer.destroy();
+    scene.destroy();
+  });
 }
 
 /** A camera that comes nearer and goes on to the next copy. */
@@ -184,33 +180,29 @@ test('in a flight, with pages that come in any order and leave before they have 
   [renderer, scene, target].forEach((owner) => owner.destroy());
 });
 
-test(
-  'a view that turns to the scene lacks nothing, though hardly anything was visible for long',
-  { skip: onlyInLab },
-  async () => {
-    const device = await anyDevice();
-    const places = Array.from({ length: 140 }, (_, k) => [9 * (k % 12), 0, 9 * Math.floor(k / 12)] as const);
-    // The pool has room for more splats than are asked for.
-    const scene = await openAll(detailFolder(pebbles(300), places));
-    // Whose room for pairs is watched, and that for splats with it.
-    const renderer = new Renderer(device, { ...options, rasterizer: 'tiles' });
-    const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
-    const look = async (at: Vector3): Promise<void> => {
-      const camera = cameraAt([-200, -5, 50], at, { width: 96, height: 64, fovXDegrees: 60, near: 0.01 });
-      renderer.render({ gaussians: scene, camera, target, detail: 4, splatBudget: 150_000 });
-      await device.queue.onSubmittedWorkDone();
-    };
-    // Room is looked at every 16 frames.
-    for (let frame = 0; frame < 18; frame++) await look([-300, -5, 50]);
-    const away = await renderer.statistics();
-    await look([50, 0, 50]);
-    const towards = await renderer.statistics();
-    console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
-    assert.ok(scene.count > 1.5e5 && away.visible === 0 && towards.visible > 100);
-    assert.equal(towards.overflow + towards.pairOverflow, 0);
-    [renderer, scene, target].forEach((owner) => owner.destroy());
-  },
-);
+test('a view that turns to the scene lacks nothing, though hardly anything was visible for long', async () => {
+  const device = await anyDevice();
+  const places = Array.from({ length: 140 }, (_, k) => [9 * (k % 12), 0, 9 * Math.floor(k / 12)] as const);
+  // The pool has room for more splats than are asked for.
+  const scene = await openAll(detailFolder(pebbles(300), places));
+  // Whose room for pairs is watched, and that for splats with it.
+  const renderer = new Renderer(device, { ...options, rasterizer: 'tiles' });
+  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
+  const look = async (at: Vector3): Promise<void> => {
+    const camera = cameraAt([-200, -5, 50], at, { width: 96, height: 64, fovXDegrees: 60, near: 0.01 });
+    renderer.render({ gaussians: scene, camera, target, detail: 4, splatBudget: 150_000 });
+    await device.queue.onSubmittedWorkDone();
+  };
+  // Room is looked at every 16 frames.
+  for (let frame = 0; frame < 18; frame++) await look([-300, -5, 50]);
+  const away = await renderer.statistics();
+  await look([50, 0, 50]);
+  const towards = await renderer.statistics();
+  console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
+  assert.ok(scene.count > 1.5e5 && away.visible === 0 && towards.visible > 100);
+  assert.equal(towards.overflow + towards.pairOverflow, 0);
+  [renderer, scene, target].forEach((owner) => owner.destroy());
+});
 
 test('whatever is wished for, comes or fails, what is above a page is there, and no page twice', () => {
   const random = randomSource(5);
