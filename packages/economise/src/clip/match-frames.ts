@@ -98,9 +98,7 @@ export function matchFrames(before: Features, next: Features): Int32Array {
   // Fast and sparse splats, such as spray, move farther than the typical distance of neighbors.
   for (let pass = 0; pass < SPARSE_PASSES; pass++) {
     const open = whichOf(found, (owner) => owner < 0);
-    const isFound = new Uint8Array(before.count);
-    for (const owner of found) if (owner >= 0) isFound[owner] = 1;
-    looking = whichOf(isFound, (is) => is === 0);
+    looking = whichOf(matchedIn(found, before.count), (is) => is === 0);
     if (open.length < 2 || looking.length === 0) break;
     const rest = featuresAt(next, open);
     const own = new Int32Array(open.length).fill(-1);
@@ -111,12 +109,19 @@ export function matchFrames(before: Features, next: Features): Int32Array {
     });
     own.forEach((owner, k) => (found[open[k]] = owner));
   }
-  const isFound = new Uint8Array(before.count);
-  for (const owner of found) if (owner >= 0) isFound[owner] = 1;
-  for (const { i, j } of doubtful) if (found[j] < 0 && isFound[i] === 0) found[j] = i;
+  const isMatched = matchedIn(found, before.count);
+  for (const { i, j } of doubtful) if (found[j] < 0 && isMatched[i] === 0) found[j] = i;
   return found;
 }
 
+/** [count] 1 for each splat of the previous frame that has a partner. */
+function matchedIn(found: Int32Array, count: number): Uint8Array {
+  const isMatched = new Uint8Array(count);
+  for (const owner of found) if (owner >= 0) isMatched[owner] = 1;
+  return isMatched;
+}
+
+/** Indices of a splat of the previous frame and of its partner in the next one. */
 interface Pair {
   readonly i: number;
   readonly j: number;
